@@ -1,11 +1,9 @@
 //! Depth of a pair from a real camera: preparation, measurement, validity.
 
+mod finding;
 mod scaled_blur;
 
-use std::fmt;
-
 use ndarray::{Array2, ArrayView2, Zip};
-use serde::{Deserialize, Serialize};
 
 use crate::adaptive_window::{
     Bank, Estimate, Window, WindowSettings, check_pair, estimate, estimate_without_depth,
@@ -14,7 +12,7 @@ use crate::baselines::{self, BaselineError};
 use crate::coarseness::coarseness;
 use crate::depth_map::{DepthMap, Warning};
 use crate::fill;
-use crate::mosaic::{self, is_mosaic};
+use crate::mosaic::is_mosaic;
 use crate::operators::{DesignError, Operators};
 use crate::optics::{Optics, Stage};
 use crate::pipeline::{RunError, Settings, depth_from_pair, extend_border, fill_border, warnings_after};
@@ -25,6 +23,7 @@ use crate::psf::Psf;
 use crate::reason::Reason;
 use crate::simd::{self, Backend};
 use crate::validity::{Lost, Validity, ValiditySettings, assess};
+pub use finding::Finding;
 use scaled_blur::undo_scaled_blur;
 
 /// Alpha of a pixel measured out of range before blur scaling is undone.
@@ -115,109 +114,6 @@ pub enum MeasureError {
     Design(#[from] DesignError),
 }
 
-/// Caveat of a map.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Finding {
-    /// A warning of the run time.
-    Run(String),
-    /// The run time found the images in the wrong order.
-    SwappedByScene(String),
-    /// Pixels without depth.
-    Lost(Lost),
-    /// The near image is larger: the lens is not telecentric.
-    NotTelecentric {
-        /// Its measured size relative to the far image.
-        magnification: f64,
-        /// The value that follows from the optics.
-        of_optics: f64,
-    },
-    /// The near image is smaller by as much as it should be larger.
-    SwappedByMagnification {
-        /// Its measured size relative to the far image.
-        magnification: f64,
-    },
-    /// Both images differ by noise alone.
-    EquallySharp,
-    /// The images are the raw mosaic of a colour sensor.
-    Mosaic,
-    /// The model leaves too much.
-    Unexplained {
-        /// Texture beyond the noise, mean squares.
-        left_over: f64,
-        /// The point spread function that was assumed.
-        psf: String,
-        /// Largest blur radius, px.
-        max_blur_px: f64,
-    },
-    /// Nothing rises above the noise.
-    NothingSharp,
-    /// Bands of brightness were evened out.
-    Bands {
-        /// Largest deviation from 1 of a row's relative brightness.
-        amplitude: f64,
-    },
-    /// Lossy compression is a large part of the noise.
-    Compressed {
-        /// Part of the noise's variance.
-        of_noise: f64,
-    },
-}
-
-impl Finding {
-    /// Whether the images seem to be in the wrong order.
-    pub const fn is_swapped(&self) -> bool {
-        matches!(self, Self::SwappedByScene(_) | Self::SwappedByMagnification { .. })
-    }
-}
-
-impl fmt::Display for Finding {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Run(text) | Self::SwappedByScene(text) => f.write_str(text),
-            Self::Lost(Lost { reason, fraction, .. }) => {
-                write!(f, "{:.1} % of the map have no depth: {}", 100.0 * fraction, reason.words())
-            }
-            Self::NotTelecentric { magnification, of_optics } => write!(
-                f,
-                "the near image is {:.3} % larger, as by a lens that is not telecentric ({:.3} %): say telecentric = false in \
-                 [lens]",
-                100.0 * (magnification - 1.0),
-                100.0 * (of_optics - 1.0)
-            ),
-            Self::SwappedByMagnification { magnification } => write!(
-                f,
-                "the pair looks swapped: the near image is {:.3} % smaller than the far one, and by its optics it is larger; is FAR \
-                 really the far-focused image?",
-                100.0 * (1.0 - magnification)
-            ),
-            Self::Unexplained { left_over, psf, max_blur_px } => write!(
-                f,
-                "the model leaves {:.1} % of the detail unexplained (usual is below 2): is the PSF {psf} with a blur of up to \
-                 {max_blur_px:.3} px right? farnear calibrate psf finds it. Another black level in one image does the same",
-                100.0 * left_over.sqrt()
-            ),
-            Self::EquallySharp => f.write_str(
-                "the images differ by noise alone: did the focus move between them? Only a plane in the middle of the working range \
-                 looks the same in both",
-            ),
-            Self::Mosaic => f.write_str(mosaic::WORDS),
-            Self::Bands { amplitude } => write!(
-                f,
-                "bands of brightness of up to {:.1} % across one image were evened out: a lamp that flickers and a rolling shutter?",
-                100.0 * amplitude
-            ),
-            Self::Compressed { of_noise } => write!(
-                f,
-                "compression (JPEG) is {:.0} % of the noise, which makes depth less exact: save PNG or TIFF, or JPEG of quality 95",
-                100.0 * of_noise
-            ),
-            Self::NothingSharp => f.write_str(
-                "neither image has detail above its noise: the scene lies far outside the range, or has none",
-            ),
-        }
-    }
-}
-
 /// Depth of a real pair with its quality.
 #[derive(Debug, Clone)]
 pub struct Measurement {
@@ -301,6 +197,9 @@ pub(crate) fn measure_after(
         lost.fraction > LEAST_REPORTED && (lost.reason != Reason::Unsure || validity.valid_fraction == 0.0)
     };
     findings.extend(validity.lost.iter().filter(reported).copied().map(Finding::Lost));
+    if validity.valid_fraction == 0.0 {
+        findings.insert(0, Finding::NoDepth);
+    }
     if validity.valid_fraction < TELLING {
         // With nearly no depth, the residual carries no information on the lens.
         findings.retain(|finding| !matches!(finding, Finding::Unexplained { .. }));

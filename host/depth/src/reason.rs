@@ -63,7 +63,7 @@ impl Reason {
             Self::Moved => "moved between the exposures",
             Self::BadPixel => "bad pixel of the camera",
             Self::Misfit => "not explained by the model",
-            Self::NotFinite => "no finite number in the file",
+            Self::NotFinite => "no value in the file (NaN or transparent)",
             Self::Unsure => "less confident than asked for",
             Self::BeyondCorrection => "beyond what the correction was taught",
         }

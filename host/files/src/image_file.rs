@@ -8,7 +8,8 @@
 //!
 //! The content, not the name, selects the format. EXIF orientation is applied. Raw camera files, previews and other
 //! formats are rejected with a remedy. `file.tif#3` is page 3 (from 1) of a multi-page TIFF. Colour becomes
-//! `(R + G + B) / 3`, as in Li 2014, unless [`Grey`] differs; alpha is ignored.
+//! `(R + G + B) / 3`, as in Li 2014, unless [`Grey`] differs. Pixels whose alpha is 0 are NaN, unless all have it; other alpha is
+//! ignored.
 
 mod complete;
 mod decode;
@@ -37,9 +38,10 @@ pub use write::{encode_png, encode_tiff, png_to, png8_to};
 
 #[derive(Clone, PartialEq, Debug)]
 pub struct GreyImage {
-    /// (height, width). Integers are divided by their full scale (0..=1); floats are unchanged.
+    /// (height, width). Integers are divided by their full scale (0..=1); floats are unchanged. NaN where transparent.
     pub pixels: Array2<f32>,
     pub samples: Samples,
+    /// Whether red, green and blue differ anywhere.
     pub colour: bool,
     /// Saturation value, if known to be below full scale (12 bits in 16).
     pub white_level: Option<f32>,

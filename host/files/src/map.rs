@@ -29,7 +29,7 @@ pub enum MapError {
     #[error("{} is neither .npy nor TIFF: {reason}", path.display())]
     Format { path: PathBuf, reason: String },
     #[error("{} is not a mask: {reason}", path.display())]
-    Mask { path: PathBuf, reason: NpyError },
+    Mask { path: PathBuf, reason: String },
     #[error(transparent)]
     Image(#[from] ImageError),
     #[error("{} has three channels, and a map has one: store the depth as grey", path.display())]
@@ -88,7 +88,8 @@ fn nodata(tiff: &[u8]) -> Option<f32> {
 pub fn read_mask(path: &Path) -> Result<Array2<bool>, MapError> {
     let bytes = image_file::read_bytes(path)?;
     if bytes.starts_with(npy::MAGIC) {
-        return npy::read_mask(&bytes).map_err(|reason| MapError::Mask { path: path.into(), reason });
+        return npy::read_mask(&bytes)
+            .map_err(|error| MapError::Mask { path: path.into(), reason: error.to_string() });
     }
     let refused = |reason: String| ImageError::Format { path: path.into(), reason };
     let decoded = image_file::decode_with(&bytes, Signed::AsUnsigned).map_err(refused)?;
@@ -102,7 +103,16 @@ pub fn read_mask(path: &Path) -> Result<Array2<bool>, MapError> {
             "its lossy compression (JPEG) changes values next to edges: store the mask as PNG".into();
         return Err(refused(reason).into());
     }
-    Ok(grey.pixels.mapv(|value| value != 0.0 && !value.is_nan()))
+    let mask = grey.pixels.mapv(|value| value != 0.0 && !value.is_nan());
+    let first = grey.pixels.first();
+    let differ = || grey.pixels.iter().any(|value| Some(value) != first);
+    if grey.samples != image_file::Samples::Float && mask.iter().all(|set| *set) && differ() {
+        let reason =
+            "its pixels differ and none is 0: a mask is 0 where it is not set, and anything else where it is"
+                .into();
+        return Err(MapError::Mask { path: path.into(), reason });
+    }
+    Ok(mask)
 }
 
 /// Distance of a value from all others, relative to their range, beyond which it is not a depth.
@@ -307,6 +317,15 @@ mod tests {
         let (_folder, path) = stored("mask.jpg", jpeg.get_ref());
         let error = read_mask(&path).unwrap_err().to_string();
         assert!(error.contains("JPEG") && error.contains("PNG"), "{error}");
+    }
+
+    #[test]
+    fn a_mask_that_is_set_everywhere_by_several_values_is_refused() {
+        for ([left, right], accepted) in [([1, 2], false), ([0, 2], true), ([255, 255], true)] {
+            let png = image_file::encode_png(array![[left, right]].view(), 8).unwrap();
+            let (_folder, path) = stored("mask.png", &png);
+            assert_eq!(read_mask(&path).is_ok(), accepted, "{left} {right}");
+        }
     }
 
     #[test]

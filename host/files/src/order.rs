@@ -265,6 +265,8 @@ mod tests {
             &["1305031103.02.png", "1305031103.1.png"],
             &["z-2.0um.png", "z-1.5um.png", "z0.0um.png", "z0.25um.png", "z0.5um.png"],
             &["z_0.png", "z_0.25.png", "z_0.5.png", "z_1.png"],
+            &["z-1,50.png", "z-1,25.png", "z-0,75.png", "z0,00.png", "z0,25.png", "z1,00.png"],
+            &["slice_0mm.tif", "slice_0,25mm.tif", "slice_0,5mm.tif", "slice_1mm.tif"],
             &["z_0.png", "z_2.5e-05.png", "z_5e-05.png", "z_0.0001.png", "z_0.000125.png"],
         ] {
             let reversed: Vec<&str> = names.iter().rev().copied().collect();
@@ -280,6 +282,7 @@ mod tests {
             &["v1.2_003.png", "v1.2_010.png", "v1.12_001.png"][..],
             &["fig1.1.png", "fig1.9.png", "fig1.10.png"],
             &["2024.5.9.png", "2024.5.25.png"],
+            &["2024,5,9.png", "2024,5,25.png"],
             &["a.9.png", "a.10.png"],
         ] {
             let reversed: Vec<&str> = names.iter().rev().copied().collect();

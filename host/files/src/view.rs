@@ -53,8 +53,8 @@ fn draw(unit: &str, depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> R
     // Text height is 3.5 % of the picture within limits.
     let mut writer = Writer::new((height as f32 * 0.035).clamp(13.0, 60.0))?;
     let (step, decimals) = range.0.map_or((1.0, 0), |(near, far)| ticks(f64::from(far - near)));
-    let label = |tick: f64| format!("{tick:.decimals$} {unit}");
-    let mut label_width = writer.width(&format!("0000.0 {unit}"));
+    let label = |tick: f64| labelled(&format!("{tick:.decimals$}"), unit);
+    let mut label_width = writer.width(&labelled("0000.0", unit));
     if let (Some((near, far)), 3..) = (range.0, decimals) {
         let ends = [near, far].map(|end| writer.width(&label(f64::from(end))));
         label_width = label_width.max(ends[0]).max(ends[1]);
@@ -101,6 +101,11 @@ fn draw(unit: &str, depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> R
         tick += step;
     }
     Ok(canvas)
+}
+
+/// A number in its unit: 12 mm, but image 12.
+fn labelled(number: &str, unit: &str) -> String {
+    if unit == "image" { format!("{unit} {number}") } else { format!("{number} {unit}") }
 }
 
 /// Colour table of a range: the scale takes longer than the rest of a large picture.
@@ -222,6 +227,11 @@ mod tests {
             let width = picture.width() as usize;
             assert!(width > columns && width < MAX_WIDTH_PX.max(columns) + 300, "{columns}: {width}");
         }
+    }
+
+    #[test]
+    fn images_are_numbered() {
+        assert_eq!(["mm", "image"].map(|unit| labelled("12", unit)), ["12 mm", "image 12"]);
     }
 
     #[test]

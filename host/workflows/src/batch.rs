@@ -59,7 +59,7 @@ pub struct BatchSettings {
     pub shard: Shard,
     /// Verify finished results by hash, not only by file length.
     pub verify: bool,
-    /// JSON lines of failures. Default: `NAME.failures.jsonl` next to the manifest.
+    /// JSON lines of failures. Default: `MANIFEST.failures.jsonl` next to the manifest.
     pub failures: Option<PathBuf>,
     /// CSV table of the shard's jobs with their figures; `figures.2of4.csv` for one of several shards. A dry run writes none.
     pub summary: Option<PathBuf>,
@@ -104,10 +104,10 @@ impl Shard {
         (number - 1) % self.of == self.index - 1
     }
 
-    /// `path` with another ending, and with the number of the shard if there are several: `pairs.2of3.csv`.
-    fn report(self, path: &Path, ending: &OsStr) -> PathBuf {
+    /// A file next to `path`: the number of the shard, if there are several, comes between `name` and `ending`.
+    fn report(self, path: &Path, name: Option<&OsStr>, ending: &OsStr) -> PathBuf {
         let Self { index, of } = self;
-        let mut name = path.file_stem().unwrap_or_default().to_os_string();
+        let mut name = name.unwrap_or_default().to_os_string();
         if of > 1 {
             name.push(format!(".{index}of{of}"));
         }
@@ -233,7 +233,8 @@ pub fn run(
 }
 
 fn failures_file(settings: &BatchSettings) -> PathBuf {
-    settings.shard.report(&settings.manifest, ".failures.jsonl".as_ref())
+    let manifest = &settings.manifest;
+    settings.shard.report(manifest, manifest.file_name(), ".failures.jsonl".as_ref())
 }
 
 /// `None` in a dry run.
@@ -244,7 +245,7 @@ fn summary_file(settings: &BatchSettings) -> Option<PathBuf> {
         ending.push(".");
         ending.push(extension);
     }
-    Some(settings.shard.report(path, &ending))
+    Some(settings.shard.report(path, path.file_stem(), &ending))
 }
 
 struct Work<'a> {
@@ -430,8 +431,10 @@ mod tests {
             dry_run: false,
             allow_failures: false,
         };
-        assert_eq!(failures_file(&settings("1/1")), Path::new("a/pairs.failures.jsonl"));
-        assert_eq!(failures_file(&settings("2/3")), Path::new("a/pairs.2of3.failures.jsonl"));
+        assert_eq!(failures_file(&settings("1/1")), Path::new("a/pairs.toml.failures.jsonl"));
+        let table = BatchSettings { manifest: "a/pairs.csv".into(), ..settings("1/1") };
+        assert_eq!(failures_file(&table), Path::new("a/pairs.csv.failures.jsonl"));
+        assert_eq!(failures_file(&settings("2/3")), Path::new("a/pairs.toml.2of3.failures.jsonl"));
         assert_eq!(summary_file(&settings("1/1")), Some("b/figures.csv".into()));
         assert_eq!(summary_file(&settings("2/3")), Some("b/figures.2of3.csv".into()));
         assert_eq!(summary_file(&BatchSettings { dry_run: true, ..settings("1/1") }), None);

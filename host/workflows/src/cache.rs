@@ -10,7 +10,7 @@ use std::{
 use farnear_depth::{corrections::Correction, operators::Operators, optics::Optics, prepare::CameraFrames};
 
 use crate::{
-    activity::recognition::Model,
+    activity::recognition::{MODEL_FILE, Model},
     camera_frames, correction_file,
     error::{Result, WorkflowError},
     operators,
@@ -67,7 +67,7 @@ impl Cache {
     }
 
     pub(crate) fn model(&self, path: &Path) -> Result<Arc<Model>> {
-        let version = Model::file(path).map(|path| FileVersion::of("the model", path)).transpose()?;
+        let version = Model::file(path).map(|path| FileVersion::of(MODEL_FILE, path)).transpose()?;
         self.models.get((path.into(), version), || Model::read(path))
     }
 }

@@ -28,7 +28,7 @@ use serde::Serialize;
 use crate::{
     context::Context,
     error::{About, Result, WorkflowError},
-    figures::rounded,
+    figures::{rounded, rounded_for},
     optics::{self, OpticsDoubt},
     request::Request,
 };
@@ -85,11 +85,12 @@ fn compute_here(settings: &DepthRequest, context: &Context<'_>) -> Result<DepthF
     Results::new(settings, &inputs, &computed, &warnings, &out)?.write(&out, context)?;
     context.info(&format!("wrote {}", out.display()));
     let (height, width) = computed.map.depth_mm.dim();
+    let range = inputs.optics.working_range();
     Ok(DepthFigures {
         seconds: rounded(seconds, 6),
         width,
         height,
-        median_mm: rounded(median(&computed.map.depth_mm), 3),
+        median_mm: rounded_for(range.far_mm - range.near_mm, median(&computed.map.depth_mm), 3),
         low_texture_fraction: rounded(computed.map.low_texture_fraction, 6),
         valid_fraction: rounded(computed.map.valid_fraction(), 6),
         uncertainty: computed.deviation.map(|(_, found)| found),

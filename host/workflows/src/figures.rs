@@ -3,3 +3,29 @@ pub fn rounded(value: f64, decimals: i32) -> f64 {
     let scale = 10f64.powi(decimals);
     (value * scale).round() / scale
 }
+
+/// Most decimals in addition: doubles have no more digits.
+const MOST_ZEROS: f64 = 12.0;
+
+/// [`rounded`] with one more decimal for each zero after the point of `size`, so that micrometres in mm keep their digits.
+pub fn rounded_for(size: f64, value: f64, decimals: i32) -> f64 {
+    let zeros = (-size.abs().log10()).ceil() - 1.0;
+    rounded(value, decimals + zeros.clamp(0.0, MOST_ZEROS) as i32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_sizes_keep_their_digits_and_usual_ones_their_decimals() {
+        for size in [46.2, 1.0, 0.1272, 0.1] {
+            assert_eq!(rounded_for(size, 910.136_96, 3), 910.137, "{size}");
+        }
+        assert_eq!(rounded_for(0.0006, 6.545_237_386, 3), 6.545_237);
+        assert_eq!(rounded_for(6.5e-5, 6.543_21e-5, 4), 6.543e-5);
+        assert_eq!(rounded_for(0.0, 0.0, 4), 0.0);
+        assert_eq!(rounded_for(f64::NAN, 1.23, 1), 1.2);
+        assert!(rounded_for(f64::NAN, f64::NAN, 3).is_nan());
+    }
+}

@@ -27,6 +27,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_with::{DisplayFromStr, serde_as};
 
+pub(crate) use images::fill_specks;
 pub use in_memory::{PreparedStack, prepare_stack};
 pub use positions::{depth_of_places, even_positions};
 
@@ -58,12 +59,18 @@ pub struct FocusStackRequest {
     pub stack: PathBuf,
     /// Distances from lens to object at which the images are focused, in mm. Without any, the folder's capture.toml or the TIFF's
     /// metadata give positions, else depth is the number of the image.
-    #[cfg_attr(feature = "clap", arg(long, value_name = "MM,...", value_delimiter = ','))]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "MM,...", value_delimiter = ',', value_parser = number))]
     pub distances_mm: Option<Vec<f64>>,
     /// Distances from lens to sensor, in mm.
     #[cfg_attr(
         feature = "clap",
-        arg(long, value_name = "MM,...", value_delimiter = ',', conflicts_with = "distances_mm")
+        arg(
+            long,
+            value_name = "MM,...",
+            value_delimiter = ',',
+            value_parser = number,
+            conflicts_with = "distances_mm"
+        )
     )]
     pub sensor_mm: Option<Vec<f64>>,
     /// Positions of the stage, in um, also zero or negative (--positions-um=-5,0,5); depth.npy is in um then.
@@ -73,6 +80,7 @@ pub struct FocusStackRequest {
             long,
             value_name = "UM,...",
             value_delimiter = ',',
+            value_parser = number,
             allow_hyphen_values = true,
             conflicts_with_all = ["distances_mm", "sensor_mm"]
         )
@@ -122,6 +130,12 @@ pub struct FocusStackRequest {
     /// Folder for the results: a new one, or that of an earlier focus stack, which is replaced.
     #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
     pub out: PathBuf,
+}
+
+/// A number of a list, which may have blanks around it.
+#[cfg(feature = "clap")]
+fn number(text: &str) -> std::result::Result<f64, std::num::ParseFloatError> {
+    text.trim().parse()
 }
 
 impl Default for FocusStackRequest {
@@ -180,7 +194,7 @@ impl Request for FocusStackRequest {
         let given = [&self.distances_mm, &self.sensor_mm, &self.positions_um];
         if given.iter().filter(|numbers| numbers.is_some()).count() > 1 {
             let expected = "one of distances-mm, sensor-mm and positions-um";
-            return Err(WorkflowError::parameter("distances-mm", "several kinds of positions", expected));
+            return Err(WorkflowError::parameter("distances-mm", "(several kinds of positions)", expected));
         }
         Ok(self.computation().check()?)
     }
@@ -241,8 +255,8 @@ pub struct FocusStackFigures {
     /// Share of pixels with a value.
     pub known: f64,
     pub median: Option<f64>,
-    /// Largest displacement of a pixel.
-    pub moved_px: f64,
+    /// Largest displacement of a pixel by alignment; `None` without.
+    pub moved_px: Option<f64>,
     pub warnings: Vec<String>,
 }
 
@@ -306,7 +320,7 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
     }
     images.divide_by(&frames.gains);
     listed.without(&indices);
-    let moved_px = frames::farthest_px(&frames.warps, images.dim(0));
+    let moved_px = request.align.0.map(|_| frames::farthest_px(&frames.warps, images.dim(0)));
     let unseen = images.prepare(listed.distortion(), &frames.warps)?;
     context.info(&format!("measuring {} images by {}", images.count(), request.measure));
     let mut map =
@@ -369,7 +383,7 @@ fn figures(
     depth: &Array2<f32>,
     listed: &positions::Listed,
     map: &StackMap,
-    moved_px: f64,
+    moved_px: Option<f64>,
     left_out: Vec<String>,
     mut warnings: Vec<String>,
 ) -> FocusStackFigures {
@@ -393,7 +407,7 @@ fn figures(
         unit: listed.axis.unit(),
         known: rounded(known, 4),
         median,
-        moved_px: rounded(moved_px, 2),
+        moved_px: moved_px.map(|px| rounded(px, 2)),
         warnings,
     }
 }

@@ -3,7 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use farnear_depth::psf::{Psf, RadialPsf};
-use farnear_files::{image_file, map};
+use farnear_files::{
+    image_file::{self, Samples},
+    map,
+};
 
 use crate::{
     context::Context,
@@ -70,7 +73,16 @@ impl PsfSource {
             Self::Image { file, radius_px } => (file, *radius_px),
         };
         let is_map = file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("npy"));
-        let image = if is_map { map::read(file)? } else { image_file::read_grey(file)?.pixels };
+        let image = if is_map {
+            map::read(file)?
+        } else {
+            let mut image = image_file::read_grey(file)?;
+            // What is transparent in a drawing, NaN, is dark.
+            if image.samples != Samples::Float {
+                image.pixels.mapv_inplace(|value| value.max(0.0));
+            }
+            image.pixels
+        };
         let drawn = RadialPsf::from_image(image.view(), radius_px)
             .map_err(|error| WorkflowError::parameter("psf", file.display(), error.to_string()))?;
         if drawn.not_round > NOT_ROUND {
@@ -88,6 +100,19 @@ impl PsfSource {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_transparent_in_a_drawing_is_dark() {
+        let folder = tempfile::tempdir().unwrap();
+        let read = |name: &str, outside: [u8; 4]| {
+            let file = folder.path().join(name);
+            let inside = |x: u32, y: u32| (f64::from(x) - 15.5).hypot(f64::from(y) - 15.5) < 14.0;
+            let pixel = |x: u32, y: u32| image::Rgba(if inside(x, y) { [255; 4] } else { outside });
+            image::RgbaImage::from_fn(32, 32, pixel).save(&file).unwrap();
+            PsfSource::Image { file, radius_px: None }.read(&Context::unattended()).unwrap()
+        };
+        assert_eq!(read("clear.png", [255, 255, 255, 0]), read("black.png", [0, 0, 0, 255]));
+    }
 
     #[test]
     fn names_are_distinguished_from_files() {

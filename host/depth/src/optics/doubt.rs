@@ -9,6 +9,7 @@ use super::Optics;
 pub struct Doubt {
     what: &'static str,
     value: f64,
+    /// With the blank before it.
     unit: &'static str,
     usual: [f64; 2],
 }
@@ -20,28 +21,28 @@ impl fmt::Display for Doubt {
         let Self { what, value, unit, usual: [low, high] } = self;
         write!(
             f,
-            "{what} is {value:.4} {unit}, usual is {low} to {high}: is a number of the optics in another unit?"
+            "{what} is {value:.4}{unit}, usual is {low} to {high}: is a number of the optics in another unit?"
         )
     }
 }
 
 impl Optics {
-    /// Values that are probably wrong. Most values of a lens that was learned without a scale are assumed ones.
+    /// Values that are probably wrong. Of a lens of `calibrate stack`, all but the largest blur are assumed ones.
     pub fn doubts(&self) -> Vec<Doubt> {
-        let has_scale = self.stage.is_none_or(|stage| stage.scale_known);
+        let learned = self.stage.is_some();
         let range = self.working_range();
         let span = (range.far_mm - range.near_mm) / range.far_mm * 100.0;
         [
-            ("focal_length_mm", self.focal_length_mm, "mm", [1.0, 2000.0]),
+            ("focal_length_mm", self.focal_length_mm, " mm", [1.0, 2000.0]),
             ("the f-number", self.f_number, "", [0.7, 64.0]),
-            ("pixel_um", self.pixel_um, "um", [0.5, 50.0]),
+            ("pixel_um", self.pixel_um, " um", [0.5, 50.0]),
             ("far_mm in focal lengths", self.far_mm / self.focal_length_mm, "", [1.5, 2000.0]),
-            (LARGEST_BLUR, self.max_blur_px, "px", [0.5, 8.0]),
-            ("the sensor's travel", range.sensor_travel_mm, "mm", [1e-3, 20.0]),
-            ("the working range in percent of far_mm", span, "%", [0.05, 75.0]),
+            (LARGEST_BLUR, self.max_blur_px, " px", [0.5, 8.0]),
+            ("the sensor's travel", range.sensor_travel_mm, " mm", [1e-3, 20.0]),
+            ("the working range in percent of far_mm", span, " %", [0.05, 75.0]),
         ]
         .into_iter()
-        .filter(|(what, ..)| has_scale || *what == LARGEST_BLUR)
+        .filter(|(what, ..)| !learned || *what == LARGEST_BLUR)
         .filter(|(_, value, _, [low, high])| !(low..=high).contains(&value))
         .map(|(what, value, unit, usual)| Doubt { what, value, unit, usual })
         .collect()
@@ -81,8 +82,14 @@ mod tests {
             let doubts = wrong.doubts();
             assert!(!doubts.is_empty());
             assert!(doubts[0].to_string().contains("usual is"), "{}", doubts[0]);
-            // Of a lens without a scale they are assumed.
-            assert!(wrong.with_stage(Stage::identity(1, 1)).doubts().is_empty());
+            // Of a learned lens they are assumed.
+            for scale_known in [false, true] {
+                let stage = Stage { scale_known, ..Stage::identity(1, 1) };
+                assert!(wrong.with_stage(stage).doubts().is_empty(), "{scale_known}");
+            }
         }
+        let mut closed = file(50.0, 7.4, 933.0, 2.703);
+        closed.f_number = 90.0;
+        assert!(closed.doubts()[0].to_string().starts_with("the f-number is 90.0000, usual is 0.7 to 64"));
     }
 }

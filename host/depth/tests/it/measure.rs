@@ -369,6 +369,8 @@ fn nothing_is_confident_outside_the_range() {
                 println!("{depth} {window} refused");
                 continue;
             };
+            let none = found.findings.contains(&Finding::NoDepth);
+            assert_eq!(none, found.validity.valid_fraction == 0.0, "{depth} {window}");
             let mut wrong = 0;
             let mut confidence = 0.0;
             for (at, depth) in found.map.depth_mm.indexed_iter().filter(|(_, d)| d.is_finite()) {

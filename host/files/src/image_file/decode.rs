@@ -201,8 +201,18 @@ impl Decoded {
         };
         let pixels = Array2::from_shape_vec((self.height, self.width), values)
             .map_err(|_| "it has fewer pixels than its header says".to_string())?;
-        let (colour, coding_variance) = (self.colours == 3, self.coding_variance);
+        let (colour, coding_variance) = (!self.is_grey(), self.coding_variance);
         Ok(GreyImage { pixels, samples, colour, white_level, coding_variance })
+    }
+
+    /// Whether red, green and blue are equal in every pixel, as in many grey pictures stored in colour.
+    fn is_grey(&self) -> bool {
+        self.colours == 1
+            || match &self.values {
+                Values::U8(v) => channels_are_equal(v, self.channels),
+                Values::U16(v) => channels_are_equal(v, self.channels),
+                Values::U32(v) | Values::F32(v) => channels_are_equal(v, self.channels),
+            }
     }
 
     /// Whether all pixels have one colour and differ only in alpha.
@@ -287,6 +297,10 @@ fn last_of<T: Copy>(values: &[T], channels: usize) -> Vec<T> {
     values.chunks_exact(channels).map(|pixel| pixel[channels - 1]).collect()
 }
 
+fn channels_are_equal<T: PartialEq>(values: &[T], channels: usize) -> bool {
+    values.chunks_exact(channels).all(|pixel| pixel[0] == pixel[1] && pixel[1] == pixel[2])
+}
+
 fn only_last_differ<T: PartialEq>(values: &[T], channels: usize, colours: usize) -> bool {
     let pixels = || values.chunks_exact(channels);
     let Some(first) = pixels().next() else { return false };
@@ -314,7 +328,25 @@ fn turn<T: Copy>(values: &mut Vec<T>, (height, width): (usize, usize), channels:
     *values = turned;
 }
 
+/// NaN where alpha is 0, unless it is 0 everywhere.
 fn greys<T: Copy + Into<f64>>(
+    samples: &[T],
+    (channels, colours): (usize, usize),
+    weights: [f64; 3],
+    even: bool,
+    full_scale: f64,
+) -> Vec<f32> {
+    let mut greys = greys_of_colours(samples, (channels, colours), weights, even, full_scale);
+    // Some programs leave an alpha that they do not use at 0.
+    let alphas = || samples.chunks_exact(channels).map(move |pixel| -> f64 { pixel[channels - 1].into() });
+    if channels > colours && alphas().any(|alpha| alpha != 0.0) {
+        let transparent = greys.iter_mut().zip(alphas()).filter(|(_, alpha)| *alpha == 0.0);
+        transparent.for_each(|(grey, _)| *grey = f32::NAN);
+    }
+    greys
+}
+
+fn greys_of_colours<T: Copy + Into<f64>>(
     samples: &[T],
     (channels, colours): (usize, usize),
     weights: [f64; 3],

@@ -25,6 +25,20 @@ fn pgm_and_colour_are_read() {
 }
 
 #[test]
+fn transparent_pixels_have_no_value_unless_all_are() {
+    let without_value = |alpha: [u8; 3]| {
+        let image = image::RgbaImage::from_fn(3, 1, |x, _| image::Rgba([51, 51, 51, alpha[x as usize]]));
+        let mut bytes = Cursor::new(Vec::new());
+        image.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+        let pixels = decode_grey(bytes.get_ref()).unwrap().pixels;
+        assert!(pixels.iter().all(|value| value.is_nan() || *value == 0.2), "{pixels}");
+        [0, 1, 2].map(|x| pixels[[0, x]].is_nan())
+    };
+    assert_eq!(without_value([255, 0, 1]), [false, true, false]);
+    assert_eq!(without_value([0; 3]), [false; 3]);
+}
+
+#[test]
 fn tiff_keeps_its_values() {
     let pixels = array![[0u16, 1, 4095], [17, 200, 3000]];
     let back = decode_grey(&encode_tiff(pixels.view(), 12).unwrap()).unwrap();
@@ -96,7 +110,8 @@ proptest! {
             bytes.truncate(lost.index(bytes.len()));
         }
         if let Ok(image) = decode_grey(&bytes) {
-            prop_assert!(image.pixels.iter().all(|value| image.samples == Samples::Float || (0.0..=1.0).contains(value)));
+            let right = |value: &f32| value.is_nan() || (0.0..=1.0).contains(value);
+            prop_assert!(image.samples == Samples::Float || image.pixels.iter().all(right));
         }
     }
 }

@@ -136,9 +136,13 @@ fn compression(code: u64) -> String {
         2..=4 => "fax",
         6 | 7 => "JPEG",
         34712 => "JPEG 2000",
+        34887 => "LERC",
         34925 => "LZMA",
+        34933 => "PNG",
+        34934 => "JPEG XR",
         50000 => "zstd",
         50001 => "WebP",
+        50002 => "JPEG XL",
         33003..=33005 => "Aperio JPEG 2000",
         34892 => "lossy DNG",
         _ => return format!("compression {code}"),
@@ -255,8 +259,8 @@ fn decode_page(file: impl Read + Seek, size: u64, page: &Page, signed: Signed) -
         return Err(format!("its {width}x{height} px in {} planes are more than it can hold", layout.planes));
     }
     let planes = if layout.plane_stride.is_some() && layout.planes > 1 { layout.planes } else { 1 };
-    // Extra planes are not left out.
-    let channels = if planes > 1 { planes } else { usize::from(colour.num_samples()) };
+    let channels =
+        if planes > 1 { planes.min(colours + usize::from(alpha)) } else { usize::from(colour.num_samples()) };
     let (width, height) = (width as usize, height as usize);
     let data = match data {
         DecodingResult::I8(v) => DecodingResult::U8(v.into_iter().map(i8::cast_unsigned).collect()),
@@ -266,17 +270,27 @@ fn decode_page(file: impl Read + Seek, size: u64, page: &Page, signed: Signed) -
     };
     let values = match data {
         DecodingResult::U8(v) if matches!(colour.bit_depth(), 1 | 2 | 4) && planes == 1 && channels == 1 => {
-            Values::U8(unpacked(&v, width, height, colour.bit_depth())?)
+            let mut samples = unpacked(&v, width, height, colour.bit_depth())?;
+            if is_bool_of_tifffile(&page.directory) {
+                samples.iter_mut().for_each(|sample| *sample = 255 - *sample);
+            }
+            Values::U8(samples)
         }
-        DecodingResult::U8(v) if colour.bit_depth() == 8 => Values::U8(interleaved(v, planes)),
-        DecodingResult::U16(v) if colour.bit_depth() == 16 => Values::U16(interleaved(v, planes)),
+        DecodingResult::U8(v) if colour.bit_depth() == 8 => Values::U8(interleaved(v, planes, channels)),
+        DecodingResult::U16(v) if colour.bit_depth() == 16 => Values::U16(interleaved(v, planes, channels)),
         DecodingResult::U32(v) => {
             let full = f64::from(u32::MAX);
-            Values::U32(interleaved(v, planes).into_iter().map(|v| (f64::from(v) / full) as f32).collect())
+            Values::U32(
+                interleaved(v, planes, channels).into_iter().map(|v| (f64::from(v) / full) as f32).collect(),
+            )
         }
-        DecodingResult::F16(v) => Values::F32(interleaved(v, planes).into_iter().map(f32::from).collect()),
-        DecodingResult::F32(v) => Values::F32(interleaved(v, planes)),
-        DecodingResult::F64(v) => Values::F32(interleaved(v, planes).into_iter().map(|v| v as f32).collect()),
+        DecodingResult::F16(v) => {
+            Values::F32(interleaved(v, planes, channels).into_iter().map(f32::from).collect())
+        }
+        DecodingResult::F32(v) => Values::F32(interleaved(v, planes, channels)),
+        DecodingResult::F64(v) => {
+            Values::F32(interleaved(v, planes, channels).into_iter().map(|v| v as f32).collect())
+        }
         _ => return Err(format!("its samples are {colour:?}: convert it to grey or RGB of 8 or 16 bits")),
     };
     let white_level = camera_white(&page.directory);
@@ -295,13 +309,20 @@ fn camera_white(directory: &Directory) -> Option<u16> {
     described.or(of_bits)
 }
 
-fn interleaved<T: Copy>(values: Vec<T>, planes: usize) -> Vec<T> {
+/// `tifffile` stores True as 1 in a file whose white is 0, and reads it back as True.
+fn is_bool_of_tifffile(directory: &Directory) -> bool {
+    let described = directory.description.as_deref().is_some_and(|text| text.starts_with("{\"shape\""));
+    directory.bits == 1 && directory.photometric == 0 && described
+}
+
+/// Pixel by pixel, the first `kept` planes.
+fn interleaved<T: Copy>(values: Vec<T>, planes: usize, kept: usize) -> Vec<T> {
     if planes == 1 {
         return values;
     }
     let size = values.len() / planes;
     (0..size)
-        .flat_map(|at| (0..planes).map(move |plane| (plane, at)))
+        .flat_map(|at| (0..kept).map(move |plane| (plane, at)))
         .map(|(plane, at)| values[plane * size + at])
         .collect()
 }

@@ -13,7 +13,7 @@ pub(crate) struct Name {
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub(crate) struct Number {
     pub sign: Option<char>,
-    /// Digits, a dot and digits if there is exactly one dot (`2024.05.01` is three numbers), and an exponent with a sign.
+    /// Digits, a dot and digits if there is exactly one dot or comma (`2024.05.01` is three numbers), and an exponent with a sign.
     pub text: String,
 }
 
@@ -25,22 +25,22 @@ impl Name {
         let mut rest = stem.as_str();
         while let Some(next) = rest.chars().next() {
             let Some(last) = name.texts.last_mut() else { unreachable!("begins with one") };
-            let length = dotted(rest);
+            let (length, separator) = dotted(rest);
             if length == 0 {
                 last.push(next);
                 rest = &rest[next.len_utf8()..];
                 continue;
             }
             let sign = last.ends_with(['+', '-']).then(|| last.pop()).flatten();
-            let dots = rest[..length].matches('.').count();
+            let dots = rest[..length].matches(separator).count();
             let length = if dots < 2 { length + exponent(&rest[length..]) } else { length };
             let (numbers, after) = rest.split_at(length);
             if dots == 1 {
-                name.push(sign, numbers);
+                name.push(sign, &numbers.replacen(',', ".", 1));
             } else {
-                numbers.split('.').enumerate().for_each(|(index, number)| match index {
+                numbers.split(separator).enumerate().for_each(|(index, number)| match index {
                     0 => name.push(sign, number),
-                    _ => name.push_after_dot(number),
+                    _ => name.push_after(separator, number),
                 });
             }
             rest = after;
@@ -53,9 +53,9 @@ impl Name {
         self.texts.push(String::new());
     }
 
-    fn push_after_dot(&mut self, text: &str) {
+    fn push_after(&mut self, separator: char, text: &str) {
         if let Some(last) = self.texts.last_mut() {
-            last.push('.');
+            last.push(separator);
         }
         self.push(None, text);
     }
@@ -76,16 +76,17 @@ impl Number {
     }
 }
 
-/// Length of `digits(.digits)*` at the beginning.
-fn dotted(text: &str) -> usize {
+/// Length of `digits(.digits)*` or `digits(,digits)*` at the beginning, and its separator.
+fn dotted(text: &str) -> (usize, char) {
     let mut length = super::digits(text);
-    while length > 0 && text[length..].starts_with('.') {
+    let separator = if text[length..].starts_with(',') { ',' } else { '.' };
+    while length > 0 && text[length..].starts_with(separator) {
         match super::digits(&text[length + 1..]) {
             0 => break,
             digits => length += 1 + digits,
         }
     }
-    length
+    (length, separator)
 }
 
 /// Length of `e-05` or `e+10` at the beginning.

@@ -273,6 +273,7 @@ mod tests {
             of(&|z| format!("img_{:09}_z{z:03}_{}um.tif", 7 * z, 250 * z)),
             of(&|z| format!("IMG_2024050{}_{:06}.jpg", 1 + z / 3, 235_958 + z)),
             of(&|z| format!("z{:.2}.png", 0.25 * f64::from(z))),
+            of(&|z| format!("z{},{:02}mm.png", z / 4, 25 * (z % 4))),
             of(&|z| format!("z{}.png", i64::from(z) - 2)),
             of(&|z| format!("z{}.png", 1 + 9 * z)),
             of(&|z| format!("2024-05-01_c1_z{z}.png")),

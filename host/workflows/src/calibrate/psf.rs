@@ -163,14 +163,16 @@ pub fn fit(settings: &CalibratePsfRequest, context: &Context<'_>) -> Result<PsfF
         .map(|([far, near], alpha)| CapturedPair { far: far.view(), near: near.view(), alpha: *alpha })
         .collect();
     let found = fit_psf(&pairs, &optics, settings.model)?;
-    if let Some(doubt) = doubt(&found, settings.model) {
-        context.progress.warn(&doubt);
+    let doubt = doubt(&found, settings.model);
+    if let Some(doubt) = &doubt {
+        context.progress.warn(doubt);
     }
     context.cancel.check("fitting the point spread function")?;
     let psf = rounded_psf(found.psf);
     if let Some(out) = &settings.out {
-        staging::write_file(out, toml::to_string(&optics.with_psf(psf))?.as_bytes())?;
-        context.info(&format!("wrote {}", out.display()));
+        let comment = doubt.map_or_else(String::new, |doubt| format!("# {}: {doubt}\n", found.verdict()));
+        staging::write_file(out, (comment + &toml::to_string(&optics.with_psf(psf))?).as_bytes())?;
+        context.info(&format!("wrote {}: {}", out.display(), found.verdict()));
     }
     let (p, k) = match psf {
         Psf::Gaussian { k } => (None, k),
@@ -213,7 +215,7 @@ fn doubt(found: &PsfFit, model: Model) -> Option<String> {
         }
         Verdict::Unexplained => Some(format!(
             "the {model} point spread function leaves {:.2} % of the images' energy, noise {:.2} %: {}do both images show the same, \
-             does the target stand where it is said to, are far_mm and max_blur_px right?",
+             does the target stand where it is said to, are far_mm and max_blur_px right? Depth measured with it is biased",
             100.0 * found.residual,
             100.0 * found.noise,
             if model == Model::Free { "" } else { "try --model free; else: " }

@@ -26,6 +26,7 @@ use crate::{
     context::Context,
     error::{Result, WorkflowError},
     figures::rounded,
+    focus_stack::fill_specks,
     optics,
     plot::Format,
     request::{PathKind, Request},
@@ -277,7 +278,7 @@ impl Listed {
                     (None, Some(positions)) => even_step(&positions, request)? * 1e-3,
                     (None, None) => {
                         let expected = "the distance between neighbouring slices; these files do not tell it";
-                        return Err(WorkflowError::parameter("step-mm", "none", expected));
+                        return Err(WorkflowError::parameter("step-mm", "(none)", expected));
                     }
                 };
                 if request.near_first {
@@ -329,14 +330,16 @@ fn read(
     let settings = ReadSettings { grey: request.grey, white_level: request.white_level };
     let mut slices = Vec::with_capacity(images.len());
     let mut white = SharedWhiteLevel::default();
-    let mut coding = 0.0;
-    stack::read(images, &settings, |index, image| -> Result<()> {
+    let (mut coding, mut filled) = (0.0, 0);
+    stack::read(images, &settings, |index, mut image| -> Result<()> {
         context.cancel.check("reading the slices")?;
         context.progress.advance("slices", index + 1, Some(images.len()));
         white.add(&image);
+        filled += fill_specks(&mut image.pixels).len();
         let holes = image.pixels.iter().filter(|value| !value.is_finite()).count();
         if holes > 0 {
-            let expected = format!("a value in each pixel; {holes} have none (NaN): crop or fill them");
+            let expected =
+                format!("a value in each pixel; {holes} have none (NaN or transparent): crop or fill them");
             return Err(WorkflowError::parameter("stack", images[index].display(), expected));
         }
         coding += image.coding_variance / images.len() as f64;
@@ -346,6 +349,11 @@ fn read(
         slices.push(image.pixels);
         Ok(())
     })?;
+    if filled > 0 {
+        context.progress.warn(&format!(
+            "{filled} single pixels of the slices have no value (NaN or transparent): the mean of their neighbours replaces each"
+        ));
+    }
     if let Some(white) = white.get(request.white_level.is_some()) {
         slices.iter_mut().for_each(|slice| slice.mapv_inplace(|value| relative(value, white)));
         coding /= f64::from(white).powi(2);

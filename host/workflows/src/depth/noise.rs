@@ -7,7 +7,7 @@ use farnear_files::{image_file::Samples, quantiles::Quantiles};
 use ndarray::{Array2, Zip};
 use serde::Serialize;
 
-use crate::{error::Result, figures::rounded};
+use crate::{error::Result, figures::rounded_for};
 
 /// Step for a correction's slope in parts of the correction's range: far above rounding, far below the curvature.
 const SLOPE_STEP: f64 = 0.02;
@@ -154,7 +154,8 @@ pub fn corrected(
     let quantiles = Quantiles::new(deviation.view());
     let quantile = |part: f64| {
         let last = quantiles.finite().saturating_sub(1);
-        rounded(quantiles.at((part * last as f64).round() as usize).map_or(f64::NAN, f64::from), 4)
+        let deviation = quantiles.at((part * last as f64).round() as usize).map_or(f64::NAN, f64::from);
+        rounded_for(deviation, deviation, 4)
     };
     let found =
         Uncertainty { noise: noise.to_string(), median_sd_mm: quantile(0.5), p95_sd_mm: quantile(0.95) };
@@ -211,6 +212,21 @@ mod tests {
         let read = (12.0 * codes_per_electron).powi(2);
         assert!((at(100.0) - read).abs() < 1e-9, "{}", at(100.0));
         assert!((at(1023.0) - read - 923.0 * codes_per_electron).abs() < 1e-9);
+    }
+
+    /// As of a microscope, whose range is below a micrometre.
+    #[test]
+    fn a_small_deviation_is_not_rounded_to_zero() {
+        let raw = DepthMap {
+            depth_mm: Array2::from_elem((4, 4), 6.5),
+            confidence: Array2::ones((4, 4)),
+            filled: None,
+            low_texture_fraction: 0.0,
+            warnings: Vec::new(),
+        };
+        let deviation = Array2::from_elem((4, 4), 2.345e-5);
+        let (_, found) = corrected(CameraNoise::Estimated, deviation, &raw, None).unwrap();
+        assert_eq!((found.median_sd_mm, found.p95_sd_mm), (2.345e-5, 2.345e-5));
     }
 
     /// Patterns over half a millimetre, as of a macro lens, whose depths are 1.1 times as far apart as the targets.

@@ -262,7 +262,7 @@ impl DepthRequest {
     }
 
     /// Pixels per side to average into one; adds a doubt if needed. A mosaic of colours needs an even number.
-    pub(super) fn bin_for(&self, optics: &Optics, is_mosaic: bool, doubts: &mut Vec<OpticsDoubt>) -> usize {
+    pub fn bin_for(&self, optics: &Optics, is_mosaic: bool, doubts: &mut Vec<OpticsDoubt>) -> usize {
         let bin = self.bin.unwrap_or_else(|| self.chosen_bin(optics, is_mosaic, doubts));
         let blur_px = optics.max_blur_px() / bin as f64;
         if bin > 1 && blur_px < LEAST_BINNED_BLUR_PX {

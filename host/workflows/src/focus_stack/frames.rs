@@ -145,7 +145,13 @@ where
         return Ok(frames);
     }
     let comparison = Comparison { images, model, context };
-    let neighbours = comparison.neighbours()?;
+    let mut neighbours = comparison.neighbours()?;
+    let registered = usual(neighbours.links.iter().map(|link| link.registered));
+    if model.is_none() {
+        // The warps tell only the motion, and a link to a foreign frame tells none.
+        let foreign = neighbours.links.iter_mut().filter(|link| link.registered < FOREIGN * registered);
+        foreign.for_each(|link| link.warp = Warp::IDENTITY);
+    }
     let scene = comparison.scene(&neighbours.links)?;
     let members: Vec<usize> = (0..count).filter(|index| scene.warps[*index].is_some()).collect();
     // Next to an unknown foreign frame a good one looks shaken.
@@ -167,7 +173,7 @@ where
                 let link = comparison.link(nearest, index)?;
                 if few_foreign {
                     let reason = format!(
-                        "it shows another scene or is turned (correlation with its neighbour {:.2}, of the others {:.2})",
+                        "it shows another scene, is turned, or is far out of focus or black (correlation with its neighbour {:.2}, of the others {:.2})",
                         link.correlation, scene.usual
                     );
                     frames.left_out.push((index, reason));
@@ -188,7 +194,8 @@ where
     frames.exchanged = exchanged.into_iter().map(|pair| pair.map(|index| members[index])).collect();
     frames.usual = Some(scene.usual);
     if model.is_none() {
-        if scene.usual > TELLING {
+        // In place, moving images correlate little.
+        if registered > TELLING {
             let measured: Vec<Warp> = members.iter().map(|index| frames.warps[*index]).collect();
             frames.drift_px = farthest_px(&measured, images.dim(0));
         }
@@ -239,7 +246,10 @@ struct Comparison<'a, S: ?Sized> {
 struct Link {
     /// From a place in the first frame to that in the second.
     warp: Warp,
+    /// After the alignment asked for: in place if none.
     correlation: f64,
+    /// After registration, whether asked for or not.
+    registered: f64,
 }
 
 impl<S> Comparison<'_, S>
@@ -259,11 +269,11 @@ where
     fn compared(&self, first: ArrayView2<f32>, second: ArrayView2<f32>) -> Link {
         let model = self.model.unwrap_or(Model::Similarity);
         match align::estimate(first, second, model, Warp::IDENTITY) {
-            None => Link { warp: Warp::IDENTITY, correlation: 0.0 },
+            None => Link { warp: Warp::IDENTITY, correlation: 0.0, registered: 0.0 },
             Some(found) => {
                 let aligned = self.model.is_some();
                 let correlation = if aligned { found.correlation } else { found.correlation_before };
-                Link { warp: found.warp, correlation }
+                Link { warp: found.warp, correlation, registered: found.correlation }
             }
         }
     }
@@ -284,7 +294,7 @@ where
     }
 
     fn scene(&self, links: &[Link]) -> Result<Scene> {
-        let usual = usual(links);
+        let usual = usual(links.iter().map(|link| link.correlation));
         let limit = if usual > TELLING { FOREIGN * usual } else { f64::NEG_INFINITY };
         let breaks = (0..links.len()).filter(|at| links[*at].correlation < limit).map(|at| at + 1);
         let ends: Vec<usize> = [0].into_iter().chain(breaks).chain([links.len() + 1]).collect();
@@ -327,8 +337,8 @@ where
     }
 }
 
-fn usual(links: &[Link]) -> f64 {
-    let mut values: Vec<f64> = links.iter().map(|link| link.correlation).collect();
+fn usual(correlations: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = correlations.collect();
     values.sort_by(f64::total_cmp);
     values.get((USUAL * values.len() as f64) as usize).copied().unwrap_or(0.0)
 }

@@ -9,7 +9,7 @@ use std::{
 };
 
 use farnear_depth::{
-    focus_stack::Slices,
+    focus_stack::{Slices, StackError},
     mosaic::{self, is_mosaic},
     optics::Distortion,
     prepare::{
@@ -27,7 +27,7 @@ use ndarray::{Array2, ArrayView2, CowArray, Ix2, s};
 use super::{FocusStackRequest, black_border};
 use crate::{
     context::Context,
-    error::{Result, WorkflowError},
+    error::{About, Result, WorkflowError},
 };
 
 pub(super) struct Images<'a> {
@@ -53,7 +53,7 @@ const AROUND_SPECK: usize = 5;
 const SPECK: f32 = 0.05;
 
 /// Fills single pixels and small groups without a value by the mean of their neighbours; returns where they are.
-pub(super) fn fill_specks(image: &mut Array2<f32>) -> Vec<(usize, usize)> {
+pub(crate) fn fill_specks(image: &mut Array2<f32>) -> Vec<(usize, usize)> {
     if image.iter().all(|value| value.is_finite()) {
         return Vec::new();
     }
@@ -128,6 +128,11 @@ impl<'a> Images<'a> {
         stack::read(paths, &settings, |index, mut image| -> Result<()> {
             context.cancel.check("reading the stack")?;
             context.progress.advance("images", index + 1, Some(paths.len()));
+            let (height, width) = image.pixels.dim();
+            if let Some((_, of)) = read.images.first().copied().filter(|(_, of)| *of != (height, width)) {
+                let error = StackError::Size { number: index + 1, width, height, of };
+                return Err::<(), _>(error).about(|| paths[index].display().to_string());
+            }
             colour |= image.colour;
             if index == 0 && is_mosaic(image.pixels.view()) {
                 warnings.push(mosaic::WORDS.into());
@@ -149,7 +154,7 @@ impl<'a> Images<'a> {
         }
         if without_value > 0 {
             warnings.push(format!(
-                "{without_value} pixels of the images have no value (NaN): the map has holes there"
+                "{without_value} pixels of the images have no value (NaN or transparent): the map has holes there"
             ));
         }
         if black > 0 {

@@ -70,7 +70,7 @@ pub(super) fn of(request: &FocusStackRequest) -> Result<Listed> {
     if positions.len() != images.len() {
         let expected = format!("one for each of the {} images is needed", images.len());
         let name = if axis == Axis::StageUm { "positions-um" } else { "distances-mm" };
-        return Err(WorkflowError::parameter(name, format!("{} numbers", positions.len()), expected));
+        return Err(WorkflowError::parameter(name, format!("({} numbers)", positions.len()), expected));
     }
     let mut order: Vec<(f64, PathBuf)> = positions.into_iter().zip(images).collect();
     order.sort_by(|a, b| a.0.total_cmp(&b.0));

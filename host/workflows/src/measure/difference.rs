@@ -38,7 +38,7 @@ pub fn difference(
     context: &Context<'_>,
 ) -> crate::Result<(Array2<f32>, DifferenceFigures)> {
     let [first, second] = [read_map(first)?, read_map(second)?];
-    let unit = shared_unit("difference", &first, &second)?;
+    let unit = shared_unit("second", &first, &second)?;
     let mut remarks = Vec::new();
     let [first, second] = [first, second].map(|map| map.depth(unit, &mut remarks));
     remarks.iter().for_each(|remark| context.progress.warn(remark));
@@ -50,17 +50,13 @@ pub(crate) fn shared_unit(name: &'static str, first: &MapFile, second: &MapFile)
     if let (Some(a), Some(b)) = (first.part, second.part)
         && a != b
     {
-        let expected = format!("two maps of one region: the first begins at {},{}", a.x, a.y);
-        return Err(WorkflowError::parameter(
-            name,
-            format!("a map that begins at {},{}", b.x, b.y),
-            expected,
-        ));
+        let expected = format!("the first map begins at {},{}, and both must show one region", a.x, a.y);
+        return Err(WorkflowError::parameter(name, format!("(begins at {},{})", b.x, b.y), expected));
     }
     match (first.unit, second.unit) {
         (Some(a), Some(b)) if a != b => {
-            let expected = format!("two maps in one unit: the first is in {a}");
-            Err(WorkflowError::parameter(name, format!("a map in {b}"), expected))
+            let expected = format!("the first map is in {}, and both must have one unit", a.words());
+            Err(WorkflowError::parameter(name, format!("(in {})", b.words()), expected))
         }
         (a, b) => Ok(a.or(b).unwrap_or_default()),
     }
@@ -118,6 +114,22 @@ mod tests {
         assert_eq!(shared_unit("difference", &a, &a).unwrap(), Unit::Mm);
         let error = shared_unit("difference", &a, &b).unwrap_err();
         assert!(error.is_usage() && error.to_string().contains("begins at 4,0"), "{error}");
+    }
+
+    #[test]
+    fn maps_of_two_units_have_no_difference() {
+        let folder = tempfile::tempdir().unwrap();
+        let map = |unit: &str| {
+            let map = folder.path().join(unit);
+            std::fs::create_dir(&map).unwrap();
+            std::fs::write(map.join("depth.npy"), farnear_files::npy::write(array![[3.0]].view())).unwrap();
+            std::fs::write(map.join("stack.toml"), format!("unit = \"{unit}\"\n")).unwrap();
+            read_map(&map).unwrap()
+        };
+        let error = shared_unit("truth", &map("mm"), &map("image")).unwrap_err();
+        assert!(error.is_usage());
+        let expected = "truth (in numbers of images): the first map is in mm, and both must have one unit";
+        assert_eq!(error.to_string(), expected);
     }
 
     #[test]

@@ -29,6 +29,15 @@ impl Unit {
         if self == Self::Um { value.is_finite() } else { is_depth(value) }
     }
 
+    /// In a sentence: depths in millimetres, in numbers of images.
+    pub(super) fn words(self) -> &'static str {
+        match self {
+            Self::Mm => "mm",
+            Self::Um => "um",
+            Self::Image => "numbers of images",
+        }
+    }
+
     /// Suffix of lengths along the axis: `mean_mm`, `mean_um`, `mean_images`.
     fn suffix(self) -> &'static str {
         match self {

@@ -15,7 +15,7 @@ use super::{GivenOptics, expected::expected_error};
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
-    figures::rounded,
+    figures::{rounded, rounded_for},
     measure::NO_SCALE,
     request::{PathKind, Request},
 };
@@ -117,10 +117,10 @@ impl Request for OpticsRequest {
                 Err(WorkflowError::parameter("range-mm", range, expected))
             }
             (None, Some(_), None) => {
-                Err(WorkflowError::parameter("range-mm", "nothing", "the depth to be measured, in mm"))
+                Err(WorkflowError::parameter("range-mm", "(none)", "the depth to be measured, in mm"))
             }
             (optics, ..) => {
-                let value = optics.as_ref().map_or("nothing".into(), |file| file.display().to_string());
+                let value = optics.as_ref().map_or("(none)".into(), |file| file.display().to_string());
                 let expected = "an optics file, or --distance-mm and --range-mm";
                 Err(WorkflowError::parameter("optics", value, expected))
             }
@@ -193,14 +193,17 @@ fn has_scale(optics: &Optics) -> bool {
 fn figures(optics: &Optics, binning: usize, contrast: f64, accepted_mm: Option<f64>) -> OpticsFigures {
     let range = optics.working_range();
     let error = expected_error(optics, contrast, binning);
-    let estimate = |mm: f64| Some(rounded(mm, 4)).filter(|mm| *mm < range.far_mm - range.near_mm);
+    let span_mm = range.far_mm - range.near_mm;
+    let estimate = |mm: f64| Some(rounded_for(mm, mm, 4)).filter(|mm| *mm < span_mm);
+    let limit = |alpha: f64| rounded_for(span_mm, optics.depth_mm(alpha), 3);
+    let pixel_mm = optics.pixel_um() * 1e-3 * (range.alpha0_mm / optics.focal_length_mm() - 1.0);
     let mut advice = advice(optics);
     let averaged = accepted_mm.map(|accepted| (error.whitened_mm / accepted).powi(2).ceil().max(1.0));
     if let Some(needed) = averaged.filter(|needed| *needed > 1.0) {
         advice.push(format!(
-            "the error with one exposure per focus is {:.3} mm: average {needed} exposures, measure a smaller range, or give the object \
+            "the error with one exposure per focus is {} mm: average {needed} exposures, measure a smaller range, or give the object \
              more texture (a projected pattern)",
-            error.whitened_mm
+            rounded_for(error.whitened_mm, error.whitened_mm, 3)
         ));
     }
     let scaled = |value: f64| has_scale(optics).then_some(value);
@@ -220,12 +223,9 @@ fn figures(optics: &Optics, binning: usize, contrast: f64, accepted_mm: Option<f
         binning: accepted_mm.map(|_| binning),
         averaged_exposures: averaged.map(|count| count as usize),
         max_blur_px: rounded(optics.max_blur_px(), 3),
-        farthest_usable_mm: rounded(optics.depth_mm(-LARGEST_ALPHA), 3),
-        nearest_usable_mm: rounded(optics.depth_mm(LARGEST_ALPHA), 3),
-        pixel_at_object_mm: scaled(rounded(
-            optics.pixel_um() * 1e-3 * (range.alpha0_mm / optics.focal_length_mm() - 1.0),
-            4,
-        )),
+        farthest_usable_mm: limit(-LARGEST_ALPHA),
+        nearest_usable_mm: limit(LARGEST_ALPHA),
+        pixel_at_object_mm: scaled(rounded_for(pixel_mm, pixel_mm, 4)),
         advice,
         expected_error_ro_mm: estimate(error.ro_mm),
         expected_error_whitened_mm: estimate(error.whitened_mm),
@@ -233,7 +233,10 @@ fn figures(optics: &Optics, binning: usize, contrast: f64, accepted_mm: Option<f
 }
 
 fn advice(optics: &Optics) -> Vec<String> {
-    let (blur, scaled) = (optics.max_blur_px(), has_scale(optics));
+    // Focal length, f-number and pixel of a learned lens are assumed ones.
+    let (blur, learned) = (optics.max_blur_px(), optics.stage().is_some());
+    let range = optics.working_range();
+    let distance = |mm: f64| rounded_for(range.far_mm - range.near_mm, mm, 2);
     let [least, most] = USABLE_BLUR_PX;
     let mut advice = Vec::new();
     if blur > most {
@@ -241,12 +244,12 @@ fn advice(optics: &Optics) -> Vec<String> {
         let f_number = optics.f_number() * blur / BEST_BLUR_PX;
         let near = of_blur(optics, BEST_BLUR_PX).map_or(String::new(), |near| {
             format!(
-                ", or focus the near image at {:.2} mm instead of {:.2} mm",
-                near,
-                optics.working_range().near_mm
+                ", or focus the near image at {} mm instead of {} mm",
+                distance(near),
+                distance(range.near_mm)
             )
         });
-        let stop = if scaled && f_number <= 22.0 {
+        let stop = if !learned && f_number <= 22.0 {
             format!(", stop down to f/{f_number:.1}")
         } else {
             String::new()
@@ -257,8 +260,8 @@ fn advice(optics: &Optics) -> Vec<String> {
     } else if blur < least {
         let f_number = optics.f_number() * blur / BEST_BLUR_PX;
         let near = of_blur(optics, BEST_BLUR_PX)
-            .map_or(String::new(), |near| format!(", or focus the near image at {near:.2} mm"));
-        let stop = if !scaled {
+            .map_or(String::new(), |near| format!(", or focus the near image at {} mm", distance(near)));
+        let stop = if learned {
             "open the aperture".into()
         } else if f_number >= 0.95 {
             format!("open the aperture to f/{f_number:.1}")
@@ -270,7 +273,7 @@ fn advice(optics: &Optics) -> Vec<String> {
         ));
     }
     let airy_px = AIRY_UM * optics.f_number() / optics.pixel_um();
-    if scaled && airy_px > 0.7 * blur {
+    if !learned && airy_px > 0.7 * blur {
         advice.push(format!(
             "diffraction blurs by {airy_px:.1} px, as much as defocus does: open the aperture or use larger pixels"
         ));
@@ -345,8 +348,9 @@ fn propose(request: &OpticsRequest) -> Result<(Optics, OpticsFigures)> {
     if rank[0] > AVERAGED_MAX {
         let error = expected_error(&optics, request.contrast, binning).whitened_mm;
         let expected = format!(
-            "noise alone causes {error:.3} mm over {range} mm at best; expected at least {:.4} mm (64 exposures averaged), or a smaller range",
-            error / AVERAGED_MAX.sqrt()
+            "noise alone causes {} mm over {range} mm at best; expected at least {} mm (64 exposures averaged), or a smaller range",
+            rounded_for(error, error, 3),
+            rounded_for(error, error / AVERAGED_MAX.sqrt(), 4)
         );
         return Err(WorkflowError::parameter("error-mm", accepted, expected));
     }
@@ -386,6 +390,19 @@ mod tests {
         assert!(!found.advice.is_empty());
     }
 
+    /// A microscope's range of 0.6 um.
+    #[test]
+    fn a_small_range_keeps_its_digits() {
+        let text = "[lens]\nfocal_length_mm = 6.5\nf_number = 119.0\ntelecentric = true\n[sensor]\npixel_um = 5.0\n\
+                    [focus]\nfar_mm = 6.5845\nnear_mm = 6.5839\n";
+        let optics: Optics = toml::from_str::<OpticsFile>(text).unwrap().check().unwrap();
+        let found = figures(&optics, 1, 0.2, None);
+        assert!(found.farthest_usable_mm > 6.5845 && found.nearest_usable_mm < 6.5839, "{found:?}");
+        assert!((found.pixel_at_object_mm.unwrap() - 6.48e-5).abs() < 1e-7, "{found:?}");
+        let error = expected_error(&optics, 0.2, 1).whitened_mm;
+        assert!((found.expected_error_whitened_mm.unwrap() / error - 1.0).abs() < 1e-3, "{found:?} {error}");
+    }
+
     #[test]
     fn advice_brings_the_blur_into_the_usable_range() {
         assert!(advice(&rig(2.703)).is_empty());
@@ -418,11 +435,10 @@ mod tests {
         for name in ["sensor", "focal_length", "f_number", "pixel_um", "pixel_at_object"] {
             assert!(!text.contains(name), "{name}: {text}");
         }
-        let diffraction = |found: &OpticsFigures| found.advice.join("; ").contains("diffraction");
-        assert!(
-            diffraction(&known) && !diffraction(&unknown) && text.contains("--object-pixel-um"),
-            "{text}"
-        );
+        // The aperture of a learned lens is assumed, with or without a scale.
+        assert!(advice(&optics).join("; ").contains("diffraction"), "{:?}", advice(&optics));
+        assert_eq!(known.advice, [""; 0]);
+        assert!(!text.contains("diffraction") && text.contains("--object-pixel-um"), "{text}");
         // The noise of averaged pixels.
         let of_pixels = expected_error(&optics, 0.2, 1).whitened_mm;
         let error = unknown.expected_error_whitened_mm.unwrap();

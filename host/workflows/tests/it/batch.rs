@@ -58,7 +58,7 @@ fn manifest(folder: &Path, jobs: &[(&str, &str)]) -> PathBuf {
 fn a_report_replaces_only_an_earlier_one() {
     let root = folder();
     let manifest = manifest(root.path(), &[("a", "one"), ("gone", "two")]);
-    fs::write(root.path().join("jobs.failures.jsonl"), "of the user").unwrap();
+    fs::write(root.path().join("jobs.toml.failures.jsonl"), "of the user").unwrap();
     let expect_refused = |settings: &BatchSettings, file: &str| {
         let path = root.path().join(file);
         let before = fs::read(&path).ok();
@@ -68,8 +68,8 @@ fn a_report_replaces_only_an_earlier_one() {
         assert!(fs::read(&path).ok() == before, "{file} was replaced");
         assert!(!root.path().join("one").exists(), "no job begins");
     };
-    expect_refused(&settings(&manifest), "jobs.failures.jsonl");
-    fs::remove_file(root.path().join("jobs.failures.jsonl")).unwrap();
+    expect_refused(&settings(&manifest), "jobs.toml.failures.jsonl");
+    fs::remove_file(root.path().join("jobs.toml.failures.jsonl")).unwrap();
     let mut files =
         vec!["jobs.toml", "camera.toml", "a/m1.png", "a", "one", "one/new.csv", "b/../one/new.csv"];
     #[cfg(unix)]

@@ -234,6 +234,18 @@ fn bmp_is_read() {
 }
 
 #[test]
+fn grey_stored_in_colour_is_grey() {
+    let grey = |blue: u8| {
+        let image = image::RgbImage::from_fn(5, 4, |x, y| {
+            let value = (20 * x + 3 * y) as u8;
+            image::Rgb([value, value, if (x, y) == (4, 3) { blue } else { value }])
+        });
+        decode_grey(&bmp(image.into())).unwrap()
+    };
+    assert_eq!([grey(89).colour, grey(90).colour], [false, true]);
+}
+
+#[test]
 fn a_deep_pgm_has_the_scale_of_its_header() {
     let pgm = decode_grey(b"P5 2 1 4095\n\x0f\xff\x07\xff").unwrap();
     assert!((pgm.pixels[(0, 0)] - 1.0).abs() < 1e-6 && (pgm.pixels[(0, 1)] - 0.5).abs() < 1e-3, "{pgm:?}");

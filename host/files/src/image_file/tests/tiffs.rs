@@ -65,9 +65,19 @@ fn colours_with_a_sample_of_unknown_meaning_are_read() {
         let refused = decode_grey(&tiff(CLASSIC, &[page])).unwrap_err();
         assert!(refused.contains("ExtraSamples 0"), "{tag}: {refused}");
     }
-    let planes = [[30_u8, 60], [60, 90], [90, 120], [7, 8]].map(Vec::from).to_vec();
+    let planes = [[30_u8, 60], [60, 90], [90, 120], [0, 8]].map(Vec::from).to_vec();
     let page = Page { strips: planes, ..page.with(284, &[2]).with(338, &[0]) };
-    assert_eq!(read(&tiff(CLASSIC, &[page])), array![[60.0, 90.0]]);
+    assert_eq!(read(&tiff(CLASSIC, std::slice::from_ref(&page))), array![[60.0, 90.0]]);
+    let with_alpha = read(&tiff(CLASSIC, &[page.with(338, &[2])]));
+    assert!(with_alpha[(0, 0)].is_nan() && with_alpha[(0, 1)] == 90.0, "{with_alpha}");
+}
+
+#[test]
+fn bool_arrays_of_tifffile_are_white_where_true() {
+    let page = Page::grey(3, 1, 1, vec![0b1010_0000]).with(262, &[0]);
+    assert_eq!(read(&tiff(CLASSIC, std::slice::from_ref(&page))), array![[0.0, 255.0, 0.0]]);
+    let texts = vec![(270, r#"{"shape": [1, 3]}"#.to_owned())];
+    assert_eq!(read(&tiff(CLASSIC, &[Page { texts, ..page }])), array![[255.0, 0.0, 255.0]]);
 }
 
 #[test]

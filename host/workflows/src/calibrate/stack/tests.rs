@@ -36,3 +36,19 @@ fn the_record_of_a_rig_gives_order_and_scale() {
         assert!(error.is_usage() && error.to_string().contains("--near-first"), "{error}");
     }
 }
+
+#[test]
+fn single_pixels_without_a_value_are_filled_and_rows_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("1.tif");
+    let read_with = |holes: &[(usize, usize)]| {
+        let mut slice = Array2::from_elem((9, 9), 0.5_f32);
+        holes.iter().for_each(|at| slice[*at] = f32::NAN);
+        std::fs::write(&path, farnear_files::map::tiff(slice.view()).unwrap()).unwrap();
+        read(std::slice::from_ref(&path), &CalibrateStackRequest::default(), &Context::unattended())
+    };
+    assert_eq!(read_with(&[(4, 4), (6, 2)]).unwrap().0, [Array2::from_elem((9, 9), 0.5_f32)]);
+    let row: Vec<(usize, usize)> = (0..9).map(|x| (0, x)).collect();
+    let error = read_with(&row).unwrap_err().to_string();
+    assert!(error.contains("1.tif") && error.contains("9 have none"), "{error}");
+}

@@ -88,6 +88,25 @@ fn warns_of_a_breathing_lens_unless_the_images_are_aligned() {
     assert_eq!(checked(&breathing, &positions, Some(Model::Similarity)).drift_px, 0.0);
 }
 
+/// 6 px a step: in place, neighbours have nothing in common.
+#[test]
+fn warns_of_a_stack_that_moves_far() {
+    let positions: Vec<f64> = (0..COUNT).map(|index| index as f64).collect();
+    let moved = |(index, image): (usize, &Array2<f32>)| {
+        Array2::from_shape_fn(image.dim(), |(y, x)| image[(y, (x + 96 - 6 * index) % 96)])
+    };
+    let mut images: Vec<Array2<f32>> = stack().iter().enumerate().map(moved).collect();
+    for kind in ["good", "with a foreign frame"] {
+        let found = checked(&images, &positions, None);
+        assert!(found.usual.unwrap() < TELLING, "{kind}: {:?}", found.usual);
+        // From the image in the middle to the ends.
+        assert!((found.drift_px - 30.0).abs() < 3.0, "{kind}: {}", found.drift_px);
+        let warnings = found.warnings();
+        assert!(warnings.iter().any(|text| text.contains("--align similarity")), "{kind}: {warnings:?}");
+        images[2] = mean(&scene(2), 3);
+    }
+}
+
 #[test]
 fn finds_a_foreign_or_turned_frame_at_any_place() {
     for at in [0, 1, 4, COUNT / 2, COUNT - 2, COUNT - 1] {
