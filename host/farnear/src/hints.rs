@@ -1,14 +1,25 @@
 //! Commands that remedy an error: the workflows' errors carry facts only.
 
+use std::{io::ErrorKind, path::Path};
+
 use farnear_capture::{
     ClientError, PortError, board_correction::BoardCorrectionError, expose::CaptureError,
     focus::FocusSearchError,
 };
+use farnear_files::{masks::MaskError, video::VideoError};
 use farnear_protocol::RequestError;
+use farnear_silhouettes::readers::READERS;
 use farnear_workflows::{
-    WorkflowError, activity::samples::SamplesError, correction_file, operators, shadow::removal::CAMERA_FILE,
-    silhouettes::SilhouettesError, simulator::SimulatorError,
+    WorkflowError,
+    activity::{recognition::MODEL_FILE, samples::SamplesError, shipped},
+    correction_file, operators,
+    shadow::removal::CAMERA_FILE,
+    silhouettes::SilhouettesError,
+    simulator::SimulatorError,
 };
+
+/// Lower-case endings of common videos.
+const VIDEOS: [&str; 11] = ["avi", "gif", "m4v", "mkv", "mov", "mp4", "mpeg", "mpg", "webm", "wmv", "y4m"];
 
 pub fn hint(error: &anyhow::Error) -> Option<String> {
     error.chain().find_map(|cause| {
@@ -48,12 +59,51 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::Read { what: CAMERA_FILE, .. } => {
             Some("`farnear shadow remove --help` shows its contents".into())
         }
+        WorkflowError::Read { what: MODEL_FILE, path, source }
+            if is_name(path) && source.kind() == ErrorKind::NotFound =>
+        {
+            let names = shipped::names();
+            Some(format!("expected a file, or {names} (`farnear activity models` describes them)"))
+        }
+        WorkflowError::Video(error) | WorkflowError::Masks(MaskError::Picture(error)) => of_video(error),
         WorkflowError::Silhouettes(SilhouettesError::TooLarge { .. }) => {
             Some("--units names a recording's unit, a larger --mm-per-px makes the picture smaller".into())
         }
         WorkflowError::Samples(error) => of_samples(error).map(Into::into),
         _ => None,
     }
+}
+
+/// Whether it has no folder and no ending.
+fn is_name(path: &Path) -> bool {
+    path.extension().is_none() && path.file_name() == Some(path.as_os_str())
+}
+
+fn of_video(error: &VideoError) -> Option<String> {
+    match error {
+        VideoError::Ffmpeg { path, .. } | VideoError::NoFfmpeg { path }
+            if READERS.iter().any(|reader| has_ending(path, reader.extensions)) =>
+        {
+            Some("`farnear silhouettes markers` makes masks of motion capture and keypoints".into())
+        }
+        VideoError::NoPictures { path } => of_folder(path),
+        _ => None,
+    }
+}
+
+/// For a folder without pictures: one of views or of videos.
+fn of_folder(folder: &Path) -> Option<String> {
+    let view = folder.join("view1");
+    if view.is_dir() {
+        return Some(format!("give the folder of a view, such as {}", view.display()));
+    }
+    let files = folder.read_dir().ok()?.filter_map(|entry| Some(entry.ok()?.path()));
+    let video = files.filter(|file| has_ending(file, &VIDEOS)).min()?;
+    Some(format!("give a video itself, such as {}", video.display()))
+}
+
+fn has_ending(path: &Path, endings: &[&str]) -> bool {
+    path.extension().is_some_and(|ending| endings.contains(&ending.to_string_lossy().to_lowercase().as_str()))
 }
 
 fn of_samples(error: &SamplesError) -> Option<&'static str> {

@@ -1,7 +1,8 @@
 //! The command line: parses arguments and prints figures; the tasks are in `farnear-workflows`. [`render`] is here
 //! because the workflows do not depend on a simulated lens.
 //!
-//! Exit code 0 only on success, 1 for failure, 2 for bad usage. Figures go to stdout, everything else to stderr.
+//! Exit code 0 only on success, 1 for failure, 2 for bad usage, 141 if stdout was closed. Figures go to stdout,
+//! everything else to stderr.
 
 mod commands;
 mod hints;
@@ -12,12 +13,13 @@ mod report;
 mod run;
 mod scene;
 mod terminal;
+mod tips;
 
 use std::process::ExitCode;
 
 use clap::{
     CommandFactory, Parser, Subcommand,
-    error::{ContextKind, ContextValue, ErrorKind},
+    error::{ContextKind, ContextValue},
 };
 use farnear_workflows::{
     WorkflowError, compare::CompareRequest, correct::CorrectRequest, depth::DepthRequest,
@@ -134,8 +136,11 @@ fn main() -> ExitCode {
         // Not returned from main: RUST_BACKTRACE would add a backtrace to the message.
         Err(error) => {
             terminal::end_count();
+            if report::is_closed(&error) {
+                return ExitCode::from(report::CLOSED);
+            }
             let hint = hints::hint(&error).map(|hint| format!("; {hint}")).unwrap_or_default();
-            eprintln!("farnear: {}{hint}", message(&error));
+            terminal::say(&format!("farnear: {}{hint}\n", message(&error)));
             let usage =
                 error.is::<report::Usage>() || error.downcast_ref().is_some_and(WorkflowError::is_usage);
             if usage { ExitCode::from(2) } else { ExitCode::FAILURE }
@@ -143,31 +148,14 @@ fn main() -> ExitCode {
     }
 }
 
-/// Parses the command line; an optional value that lacks its `=` gets a tip.
+/// Parses the command line; some errors get a tip.
 fn parse() -> Arguments {
     Arguments::try_parse().unwrap_or_else(|mut error| {
         let words: Vec<String> = std::env::args().skip(1).collect();
-        if error.kind() == ErrorKind::UnknownArgument
-            && let Some(tip) = without_equals(&words)
-        {
+        if let Some(tip) = tips::tip(&error, &Arguments::command(), &words) {
             error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
         }
         error.exit()
-    })
-}
-
-/// Tip for the first option whose value must follow `=` and that is followed by a space.
-fn without_equals(words: &[String]) -> Option<String> {
-    let mut command = Arguments::command();
-    for word in words {
-        let Some(found) = command.find_subcommand(word) else { break };
-        command = found.clone();
-    }
-    words.windows(2).find_map(|two| {
-        let (flag, value) = (two[0].strip_prefix("--")?, &two[1]);
-        let option = command.get_arguments().find(|option| option.get_long() == Some(flag))?;
-        let optional = option.is_require_equals_set() && !value.starts_with('-');
-        optional.then(|| format!("the value of --{flag} follows an equals sign: --{flag}={value}"))
     })
 }
 

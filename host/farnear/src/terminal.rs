@@ -43,10 +43,15 @@ static LEFT_S: AtomicU64 = AtomicU64::new(u64::MAX);
 /// Whether the cursor is behind a count that may be overwritten.
 static COUNTING_LINE: AtomicBool = AtomicBool::new(false);
 
+/// Writes to stderr. If it is closed, the work goes on without messages.
+pub fn say(text: &str) {
+    let _ = std::io::stderr().write_all(text.as_bytes());
+}
+
 /// Ends the line of a count, so that further text begins on a new line.
 pub fn end_count() {
     if COUNTING_LINE.swap(false, Ordering::Relaxed) {
-        eprintln!();
+        say("\n");
     }
 }
 
@@ -64,7 +69,7 @@ pub fn context() -> Result<Context<'static>> {
             if EXITS.load(Ordering::Relaxed) {
                 std::thread::sleep(GRACE);
                 farnear_files::staging::abandon_all();
-                eprintln!("farnear: interrupted; unfinished files were removed");
+                say("farnear: interrupted; unfinished files were removed\n");
                 std::process::exit(1);
             }
         })
@@ -121,7 +126,7 @@ fn in_words(seconds: u64) -> String {
 impl Progress for Terminal {
     fn info(&self, what: &str) {
         end_count();
-        eprintln!("{what}");
+        say(&format!("{what}\n"));
     }
 
     fn time_left(&self, left: Duration) {
@@ -141,13 +146,13 @@ impl Progress for Terminal {
             Counts::Hidden => return,
             Counts::Lines => {
                 if is_due() {
-                    eprintln!("{count}{left}");
+                    say(&format!("{count}{left}\n"));
                 }
                 return;
             }
             // Blanks overwrite the rest of a longer time.
-            Counts::Rising if LEFT_S.load(Ordering::Relaxed) == u64::MAX => eprint!("\r{count}"),
-            Counts::Rising => eprint!("\r{count}{left:<20}"),
+            Counts::Rising if LEFT_S.load(Ordering::Relaxed) == u64::MAX => say(&format!("\r{count}")),
+            Counts::Rising => say(&format!("\r{count}{left:<20}")),
         }
         COUNTING_LINE.store(true, Ordering::Relaxed);
         if total == Some(done) {
@@ -158,7 +163,7 @@ impl Progress for Terminal {
 
 impl Questions for Terminal {
     fn ask(&self, question: &str, cancel: &Cancel) -> Result<String, WorkflowError> {
-        eprint!("{question}");
+        say(question);
         let unanswered = || WorkflowError::Unanswered { question: question.trim().into() };
         std::io::stderr().flush().map_err(|_| unanswered())?;
         // Ctrl-C does not end a read, so a thread of its own reads; it ends with the program at the latest.
@@ -172,7 +177,7 @@ impl Questions for Terminal {
             match typed.recv_timeout(LOOK) {
                 Ok(Ok((count, line))) if count > 0 => return Ok(line),
                 Err(RecvTimeoutError::Timeout) if cancel.is_cancelled() => {
-                    eprintln!();
+                    say("\n");
                     return Err(WorkflowError::Cancelled { during: "waiting for an answer".into() });
                 }
                 Err(RecvTimeoutError::Timeout) => {}

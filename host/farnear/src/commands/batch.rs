@@ -1,4 +1,4 @@
-use std::{io, path::PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
@@ -83,13 +83,11 @@ pub fn run(arguments: Arguments) -> Result<()> {
     } = arguments;
     if let Some(kind) = generate {
         let written = batch::generate(&manifest, &kind, &field)?;
-        eprintln!("wrote {} with {written} jobs", manifest.display());
+        terminal::say(&format!("wrote {} with {written} jobs\n", manifest.display()));
         return Ok(());
     }
     let settings =
         BatchSettings { manifest, jobs, shard, verify, failures, summary, dry_run, allow_failures };
-    let line =
-        |job: &JobReport| report::print(job, true).map_err(|error| io::Error::other(format!("{error:#}")));
-    batch::run(&settings, &terminal::long_work()?, &line)?;
+    batch::run(&settings, &terminal::long_work()?, &report::line::<JobReport>)?;
     Ok(())
 }

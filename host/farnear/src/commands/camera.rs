@@ -1,4 +1,4 @@
-use std::{io::Write, time::Duration};
+use std::time::Duration;
 
 use anyhow::Result;
 use clap::{Args, Subcommand};
@@ -66,10 +66,9 @@ fn live(arguments: &LiveArguments) -> Result<()> {
         every: Duration::from_millis(arguments.every_ms),
         seconds: arguments.seconds,
     };
-    let mut print = |seen: &LiveFigures| {
-        let text = if arguments.json { serde_json::to_string(seen)? } else { words(seen) };
-        let mut stdout = std::io::stdout().lock();
-        writeln!(stdout, "{text}").and_then(|()| stdout.flush())
+    let mut print = |seen: &LiveFigures| match arguments.json {
+        true => report::line(seen),
+        false => report::to_stdout(&format!("{}\n", words(seen))),
     };
     live::live(&settings, &mut print, &terminal::context()?)?;
     Ok(())

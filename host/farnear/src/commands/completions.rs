@@ -17,5 +17,5 @@ pub struct Arguments {
 pub fn run<C: CommandFactory>(arguments: Arguments) -> Result<()> {
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut C::command(), "farnear", &mut script);
-    report::to_stdout(&script)
+    Ok(report::to_stdout(&String::from_utf8(script)?)?)
 }

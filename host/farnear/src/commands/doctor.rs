@@ -32,7 +32,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
         report::print(&figures, true)?;
     } else {
         let lines: String = figures.findings.iter().map(line).collect();
-        report::to_stdout(lines.as_bytes())?;
+        report::to_stdout(&lines)?;
     }
     match figures.missing() {
         0 => Ok(()),

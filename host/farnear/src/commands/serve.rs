@@ -11,7 +11,7 @@ use farnear_workflows::{
 };
 
 use crate::{
-    report::Usage,
+    report::{self, Usage},
     scene::{SceneArgument, packed},
     terminal,
 };
@@ -130,12 +130,14 @@ pub fn run(arguments: Arguments) -> Result<()> {
     };
     let context = terminal::context()?;
     serve(settings, &context, |address| {
-        println!("{address}");
-        eprintln!("the page is at {address}; Ctrl-C ends it and stops all motion");
+        // A reader that closes stdout has the address on stderr, too.
+        let _ = report::to_stdout(&format!("{address}\n"));
+        terminal::say(&format!("the page is at {address}; Ctrl-C ends it and stops all motion\n"));
         if arguments.open
             && let Err(error) = open::that_detached(address)
         {
-            eprintln!("warning: no browser can be started ({error}); open {address} yourself");
+            let warning = format!("warning: no browser can be started ({error}); open {address} yourself\n");
+            terminal::say(&warning);
         }
     })?;
     Ok(())

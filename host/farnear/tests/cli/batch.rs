@@ -120,14 +120,14 @@ fn a_bad_job_does_not_stop_the_others() {
             "{job}: {line}"
         );
     }
-    let kept = fs::read(folder.path("pairs.failures.jsonl")).expect("failures");
+    let kept = fs::read(folder.path("pairs.toml.failures.jsonl")).expect("failures");
     assert_eq!(lines(&kept), reports[2..], "kept apart with their messages");
     assert_eq!(files(&folder.path("mine")).len(), 1);
     assert!(!folder.listing().iter().any(|name| name.contains("partial")), "{:?}", folder.listing());
 
     fs::write(&manifest, good).expect("a writable folder");
     assert_eq!(states(&["batch", &manifest]), ["already"; 2]);
-    assert!(!folder.path("pairs.failures.jsonl").exists());
+    assert!(!folder.path("pairs.toml.failures.jsonl").exists());
 }
 
 #[test]
@@ -410,7 +410,7 @@ fn a_dry_run_reports_what_would_be_done_and_does_nothing() {
     let text = fs::read_to_string(&manifest).expect("the manifest");
     let bad = "[[job]]\ndo = 'depth'\nnear = 'gone.png'\nout = 'maps/a'\n";
     fs::write(&manifest, text + bad).expect("a writable folder");
-    let failures = folder.path("pairs.failures.jsonl");
+    let failures = folder.path("pairs.toml.failures.jsonl");
     let output = farnear(&["batch", &manifest, "--dry-run"]).output().expect("the program starts");
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.code() == Some(1) && message.contains("1 of 3 jobs would fail"), "{message}");
@@ -435,7 +435,10 @@ fn a_job_that_fails_leaves_no_result_of_an_earlier_run() {
     let (stdout, _) = succeeds(&mut farnear(&["batch", &manifest, "--allow-failures"]));
     assert!(lines(stdout.as_bytes()).iter().all(|line| line["state"] == "failed"));
     assert!(!folder.path("maps/0").exists() && !folder.path("maps/1").exists());
-    assert_eq!(fs::read_to_string(folder.path("pairs.failures.jsonl")).expect("failures").lines().count(), 2);
+    assert_eq!(
+        fs::read_to_string(folder.path("pairs.toml.failures.jsonl")).expect("failures").lines().count(),
+        2
+    );
 }
 
 #[test]

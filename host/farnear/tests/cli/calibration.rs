@@ -124,7 +124,10 @@ fn a_shifted_pair_is_aligned_or_reported() {
     assert!((found["moved_px"][0].as_f64().unwrap() - 1.0).abs() < 0.05, "{found}");
     let left = bench.figures(&[&find[..], &["--align", "none"]].concat());
     assert_eq!(left["verdict"], "unexplained", "{left}");
-    let output = bench.output(&[&find[..], &["--align", "none"]].concat());
+    let output = bench.output(&[&find[..], &["--align", "none", "--out", "found.toml"]].concat());
+    let written = fs::read_to_string(bench.0.path().join("found.toml")).unwrap();
+    assert!(written.starts_with("# unexplained: the gaussian"), "{written}");
+    bench.figures(&["optics", "--optics", "found.toml"]);
     assert!(
         String::from_utf8_lossy(&output.stderr)
             .contains("warning: the gaussian point spread function leaves")

@@ -129,7 +129,7 @@ fn stage_positions_are_any_numbers_in_um() {
     assert!(fs::read_to_string(page).expect("a page").contains(" um</td>"));
     let numbered = folder.text("numbered");
     succeeds(&mut farnear(&["focus-stack", &stack, "--out", &numbered]));
-    fails(&mut farnear(&["measure", "difference", &out, &numbered]), 2, &["a map in image", "in um"]);
+    fails(&mut farnear(&["measure", "difference", &out, &numbered]), 2, &["in numbers of images", "in um"]);
     let plane = figures(&mut farnear(&["measure", "plane", &numbered, "--json"]));
     assert!(plane["z_images"].is_number() && plane["slope_x_images_per_px"].is_number(), "{plane}");
 }
@@ -264,6 +264,8 @@ fn a_moving_camera_is_followed() {
     let out = folder.text("out");
     let found = figures(&mut farnear(&["focus-stack", &path, "--out", &out, "--align", "shift", "--json"]));
     assert!((number(&found, "moved_px") - 4.0).abs() < 0.3, "{found}");
+    let found = figures(&mut farnear(&["focus-stack", &path, "--out", &out, "--json"]));
+    assert!(found["moved_px"].is_null() && found.to_string().contains("--align similarity"), "{found}");
 }
 
 #[test]
@@ -274,7 +276,8 @@ fn invalid_stacks_are_rejected_without_output() {
         fails(farnear(&["focus-stack"]).args(arguments).args(["--out", &out]), code, &[phrase]);
         assert!(!folder.listing().iter().any(|name| name.starts_with("out")), "{phrase}");
     };
-    refuse(&[&stack, "--distances-mm", "300,310"], 2, "one for each of the 9 images is needed");
+    refuse(&[&stack, "--distances-mm", "300, 310"], 2, "(2 numbers): one for each of the 9 images is needed");
+    refuse(&[&stack, "--positions-um", "-5, 0, 5"], 2, "positions-um (3 numbers): one for each");
     refuse(&[&stack, "--distances-mm", "300,300,320,330,340,350,360,370,380"], 2, "300 mm twice");
     refuse(&[&stack, "--distances-mm", "300,far"], 2, "invalid value 'far'");
     refuse(
@@ -290,7 +293,7 @@ fn invalid_stacks_are_rejected_without_output() {
         image_file::encode_png(Array2::zeros((8, 8)).view(), 8).expect("a picture"),
     )
     .expect("a file");
-    refuse(&[&stack], 1, "image 5 has 8x8 px and the first one 80x60");
+    refuse(&[&stack], 1, "5.png: image 5 has 8x8 px and the first one 80x60");
 }
 
 /// A map without a record has the unit, and so the holes, of the other one: positions of a stage may be negative.

@@ -21,6 +21,7 @@ mod emulated_rig;
 mod emulated_work;
 mod focus_stack;
 mod half_mirror;
+mod hints;
 mod lens_choice;
 mod light;
 mod maps;

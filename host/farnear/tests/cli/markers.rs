@@ -101,10 +101,18 @@ fn recordings_that_do_not_fit_are_refused_by_name() {
     let doubled = folder.file("doubled.toml", "name = 'x'\n[[part]]\nname = 'a'\nmarkers = []\n");
     fs::create_dir(folder.path("yolo")).expect("a folder");
     folder.file("yolo/walk_1.txt", "0 0.5 0.5 0.2 0.6 0.5 0.5 0.9");
+    fs::create_dir(folder.path("poses")).expect("a folder");
+    folder.file("poses/walk_1.json", openpose(&[100.0]));
+    folder.file("poses/walk_2.json", "");
     let before = folder.listing();
     for (file, template, phrases) in [
+        (&folder.text("poses"), "keypoints", vec!["poses: walk_2.json: line 1: not JSON"]),
         (&folder.text("yolo"), "keypoints", vec!["yolo", "no .json file", ".txt"]),
-        (&good, "plug-in-gait", vec!["walk.csv", "LFHD", "B1"]),
+        (
+            &good,
+            "plug-in-gait",
+            vec!["walk.csv: none of the recording's names", "LFHD", "B1", "with --template"],
+        ),
         (&good, "jacket", vec!["jacket", "vicon-53"]),
         (&good, &doubled, vec!["doubled.toml", "no markers"]),
         (&empty, &one, vec!["empty.csv", "no frame has a visible marker"]),
@@ -376,6 +384,8 @@ fn a_folder_of_openpose_files_gives_masks_of_its_view_and_samples() {
         warnings.contains("BODY_25") && warnings.contains("2 people") && warnings.contains("guess"),
         "{warnings}"
     );
+    let index = fs::read_to_string(folder.path("masks/silhouettes.toml")).expect("an index");
+    assert!(!index.contains("rate_hz"), "keypoints state no rate: {index}");
     let mask = |frame: u32| {
         image::open(folder.path(&format!("masks/view1/frame_{frame:06}.png"))).expect("a mask").into_luma8()
     };

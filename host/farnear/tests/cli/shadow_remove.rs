@@ -4,7 +4,7 @@ use farnear_shadow::synthetic::scene::{Kind, Scene, scene};
 use farnear_silhouettes::mask::Mask;
 use image::{GrayImage, Luma};
 
-use crate::common::{Folder, fails, farnear, figures, number};
+use crate::common::{Folder, fails, farnear, figures, number, succeeds};
 
 fn save(folder: &Folder, name: &str, level: impl Fn(usize, usize) -> u8) {
     let path = folder.path(name);
@@ -73,6 +73,34 @@ fn shadows_of_seeded_scenes_go_and_people_stay() {
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     // The library's test requires 78 and 2 per cent over a hundred scenes; six scatter more.
     assert!(mean(&removed) > 70.0 && mean(&wrongly) < 4.0, "{removed:?} {wrongly:?}");
+}
+
+#[test]
+fn a_camera_that_looks_the_other_way_is_flagged_and_its_azimuth_is_named() {
+    let folder = Folder::new();
+    let mut warned = [0; 2];
+    for seed in 0..4 {
+        let drawn = scene(Kind::Standard, seed);
+        save_mask(&folder, &format!("{seed}/frame1.png"), &drawn.silhouette);
+        let (camera, time) = camera_and_time(&drawn);
+        for (turned, warned) in warned.iter_mut().enumerate() {
+            let mut pose: toml::Table = camera.parse().expect("TOML");
+            let azimuth_deg = pose["camera"]["azimuth_deg"].as_float().expect("a number");
+            let azimuth_deg = (azimuth_deg + 180.0 * turned as f64).rem_euclid(360.0);
+            pose["camera"]["azimuth_deg"] = toml::Value::Float(azimuth_deg);
+            let camera = folder.file("camera.toml", toml::to_string(&pose).expect("TOML"));
+            let [masks, out] = [seed.to_string(), format!("{seed}-{turned}")].map(|name| folder.text(&name));
+            let remove = ["shadow", "remove", &masks, "--camera", &camera, "--out", &out];
+            let place = ["--lat", "10", "--lon", "0", "--time", &time];
+            let (_, stderr) = succeeds(farnear(&remove).args(place));
+            let index = std::fs::read_to_string(folder.path(&format!("{seed}-{turned}/shadow.toml")));
+            let is_flagged = index.expect("an index").contains("poor-fit");
+            let is_named = stderr.contains("azimuth_deg in the camera file (anticlockwise");
+            assert_eq!(is_named, is_flagged, "{stderr}");
+            *warned += usize::from(is_flagged);
+        }
+    }
+    assert!(warned[0] == 0 && warned[1] >= 2, "{warned:?}");
 }
 
 #[test]

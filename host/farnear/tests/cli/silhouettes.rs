@@ -138,6 +138,13 @@ fn a_video_without_a_usable_frame_says_why() {
     let found = figures(farnear().args(learning).arg(&out).arg(&video));
     assert_eq!(found["silhouettes"], 0);
     assert!(found["remarks"].to_string().contains("lower learning-frames"), "{found}");
+    let (still, out) = (root.path().join("still"), root.path().join("none"));
+    fs::create_dir(&still).unwrap();
+    for frame in 0..40 {
+        picture(FRAMES - 1).save(still.join(format!("{frame:03}.png"))).unwrap();
+    }
+    let found = figures(farnear().args(["silhouettes", "video", "--out"]).arg(&out).arg(&still));
+    assert!(found["remarks"].to_string().contains("motionless throughout are background"), "{found}");
 }
 
 #[test]

@@ -118,6 +118,12 @@ fn bad_usage_ends_with_2() {
         (vec![], vec!["Usage: farnear"]),
         (vec!["rig"], vec!["Usage: farnear rig"]),
         (vec!["dept"], vec!["dept", "depth"]),
+        (vec!["stack", "a"], vec!["tip: similar commands: `farnear focus-stack`, `farnear calibrate stack`"]),
+        (vec!["measure", "pair1"], vec!["follows `farnear measure`: region, plane, profile, difference"]),
+        (
+            vec!["focus-stack", "a/1.jpg", "a/2.jpg", "--out", "x"],
+            vec!["'a/2.jpg'", "tip: give the folder of the pictures: a\n"],
+        ),
         (vec!["optics"], vec!["an optics file, or --distance-mm"]),
         (vec!["depth", "a.png", "--optics", optics], vec!["<NEAR>"]),
         (
@@ -212,7 +218,7 @@ fn completions_name_the_commands() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_closed_stdout_is_a_failure() {
+fn a_full_disk_behind_stdout_is_a_failure() {
     for arguments in [vec!["optics", "--optics", rig_optics()], vec!["completions", "bash"]] {
         let full = File::options().write(true).open("/dev/full").expect("Linux has /dev/full");
         let child = std::process::Command::new(env!("CARGO_BIN_EXE_farnear"))
@@ -226,6 +232,28 @@ fn a_closed_stdout_is_a_failure() {
         assert_eq!(output.status.code(), Some(1), "{stderr}");
         assert!(stderr.contains("cannot write to the standard output"), "{stderr}");
     }
+}
+
+#[test]
+fn a_closed_stdout_ends_the_program_without_a_message() {
+    for arguments in [vec!["optics", "--optics", rig_optics()], vec!["activity", "models", "--sheet"]] {
+        let (reader, writer) = std::io::pipe().expect("a pipe");
+        drop(reader);
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_farnear"));
+        let output = command.args(&arguments).stdout(writer).stderr(Stdio::piped()).spawn();
+        let output = output.expect("the program starts").wait_with_output().expect("it ends");
+        assert_eq!(output.status.code(), Some(141), "{arguments:?}");
+        assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+}
+
+#[test]
+fn a_closed_stderr_changes_no_exit_code() {
+    let (reader, writer) = std::io::pipe().expect("a pipe");
+    drop(reader);
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_farnear"));
+    let status = command.args(["optics", "--optics", "absent.toml"]).stderr(writer).status();
+    assert_eq!(status.expect("the program starts").code(), Some(1));
 }
 
 #[test]

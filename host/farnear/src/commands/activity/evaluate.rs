@@ -21,7 +21,7 @@ impl Evaluate {
         let figures = self.request.run(&terminal::computing(self.json)?)?;
         report::print(&figures, self.json)?;
         match figures.confusion().filter(|_| !self.json) {
-            Some(confusion) => report::to_stdout(format!("\n{}", confusion.to_markdown()).as_bytes()),
+            Some(confusion) => Ok(report::to_stdout(&format!("\n{}", confusion.to_markdown()))?),
             None => Ok(()),
         }
     }

@@ -24,7 +24,7 @@ struct List {
 
 pub fn run(arguments: Arguments) -> Result<()> {
     if arguments.sheet {
-        return report::to_stdout(shipped::SHEET.as_bytes());
+        return Ok(report::to_stdout(shipped::SHEET)?);
     }
     report::print(&List { model: shipped::list()? }, arguments.json)
 }

@@ -1,11 +1,11 @@
-use std::{io::Write, path::PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
 use farnear_workflows::rig::log::{self, LogSettings};
 
 use super::Target;
-use crate::terminal;
+use crate::{report, terminal};
 
 /// Follow the firmware's log. With the firmware's ELF file it is decoded, without it is printed as bytes.
 #[derive(Args)]
@@ -29,10 +29,7 @@ pub struct Arguments {
 pub fn run(arguments: Arguments) -> Result<()> {
     let Arguments { target, elf, seconds, reset } = arguments;
     let settings = LogSettings { rig: target.address()?, elf, seconds, reset };
-    let mut print = |line: &str| {
-        let mut stdout = std::io::stdout().lock();
-        writeln!(stdout, "{line}").and_then(|()| stdout.flush())
-    };
+    let mut print = |line: &str| report::to_stdout(&format!("{line}\n"));
     log::follow(&settings, &mut print, &terminal::context()?)?;
     Ok(())
 }
