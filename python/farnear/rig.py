@@ -175,15 +175,9 @@ class Rig:
         list of Exposure
             Image (height, width) and record of each.
         """
-        shots = list(positions)
-        most = int(self.info()["shots_max"])
-        taken: list[Exposure] = []
-        for begin in range(0, len(shots), most):
-            part = shots[begin : begin + most]
-            exposure_us = round(1000 * exposure_ms)
-            images = self._open.expose(self._camera_address, part, exposure_us=exposure_us, wait_s=wait_s, light=light)
-            taken.extend(_exposure(*image) for image in images)
-        return taken
+        exposure_us = round(1000 * exposure_ms)
+        images = self._open.expose(self._camera_address, list(positions), exposure_us=exposure_us, wait_s=wait_s, light=light)
+        return [_exposure(*image) for image in images]
 
     def capture_pair(
         self,

@@ -13,10 +13,7 @@ use farnear_workflows::{
     depth::DepthRequest,
     optics::{OpticsDoubt, another_size, usable_bin},
 };
-use std::{
-    path::PathBuf,
-    sync::{Mutex, PoisonError},
-};
+use std::sync::{Mutex, PoisonError};
 
 use ndarray::{CowArray, Ix2};
 use numpy::{IntoPyArray, PyArray2};
@@ -231,14 +228,16 @@ impl Bin {
             doubts.extend((bin > 1).then_some(OpticsDoubt::TooMuchBlur { blur_px, bin, binned: false }));
             return Ok(1);
         }
-        if let Some(side) = self.0.filter(|_| has_operators || optics.stage().is_some()) {
-            return Err(FarnearError::new_err(format!(
+        match self.0 {
+            Some(side) if has_operators || optics.stage().is_some() => Err(FarnearError::new_err(format!(
                 "bin is {side}; operators and optics of calibrate_stack are for pixels of one size: give no bin"
-            )));
+            ))),
+            None if has_operators => Ok(1),
+            bin => {
+                let request = DepthRequest { bin, ..DepthRequest::default() };
+                Ok(request.bin_for(optics, is_mosaic(far.view()), doubts))
+            }
         }
-        let operators = has_operators.then(PathBuf::new);
-        let request = DepthRequest { bin: self.0, operators, ..DepthRequest::default() };
-        Ok(request.bin_for(optics, is_mosaic(far.view()), doubts))
     }
 }
 

@@ -244,6 +244,11 @@ impl Piezo {
             || self.is_swinging()
     }
 
+    /// A move was ordered and waits for the end of a swing.
+    pub(crate) const fn waits(&self) -> bool {
+        self.closing && self.is_swinging()
+    }
+
     /// A loop that closes now would take the swing for a disturbance and jump by it.
     const fn is_swinging(&self) -> bool {
         self.control.is_none() && self.open_ticks < SWINGING_TICKS
@@ -290,8 +295,9 @@ impl Piezo {
     }
 
     pub(crate) fn hold(&mut self) {
+        let on_its_way = !self.arrived();
         (self.closing, self.driven) = (false, false);
-        if self.control.is_some() && !self.arrived() {
+        if on_its_way {
             self.target = Nanometres(self.measured.0.clamp(self.settings.min.0, self.settings.max.0));
         }
     }
@@ -300,7 +306,8 @@ impl Piezo {
         let Some(code) = gauge_code.filter(|code| (1..GAUGE_CODE_MAX).contains(code)) else {
             self.gauge_missing_ticks = self.gauge_missing_ticks.saturating_add(1);
             (self.near_ticks, self.still_ticks) = (0, 0); // not seen near yet
-            if self.gauge_failed() {
+            // The gauge saturates in a swing below its range.
+            if self.gauge_failed() && !self.waits() {
                 self.failed |= self.closing || self.driven || self.control.is_some();
                 (self.control, self.closing, self.driven) = (None, false, false);
             }

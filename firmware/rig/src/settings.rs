@@ -77,7 +77,7 @@ pub struct FineSettings {
     pub settle: Settle,
     /// Lower limit of this axis' dwell.
     pub dwell_min: Micros,
-    /// Settling time from the start of the move, without dwell.
+    /// Settling time from the start of the move, or from the end of the swing that it waits for, without dwell.
     pub settle_deadline: Micros,
     pub gauge_deadline: Micros,
     /// Stroke per DAC code.

@@ -103,7 +103,7 @@ pub trait Camera {
     fn arm(&mut self, mode: TriggerMode, exposure: Micros) -> Result<(), CameraError>;
 
     /// Whether it exposes for the time of [`Self::arm`] and not for the length of the trigger pulse.
-    fn sets_exposure(&mut self) -> bool {
+    fn sets_exposure(&mut self, _: TriggerMode) -> bool {
         false
     }
 

@@ -42,7 +42,8 @@ pub enum PortError {
     #[error("{port} is not a serial port; expected one such as /dev/ttyACM0, or tcp:HOST:PORT")]
     NoPort { port: String },
     #[error(
-        "port {port} is busy: another program holds it; end that program (a terminal, another farnear) first"
+        "port {port} is busy: another program (a terminal, another farnear) or an attempt that was just cancelled holds it; end the program, or try \
+         again in some seconds"
     )]
     Busy { port: String },
     #[error(

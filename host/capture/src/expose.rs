@@ -65,7 +65,7 @@ pub fn expose<E: From<CaptureError> + From<ClientError>>(
 }
 
 /// As [`expose`] for any number of shots: one program after the other, each as long as the board can hold. `on_image`
-/// receives the index of the shot.
+/// receives the index of the shot in `shots`.
 pub fn expose_in_parts<E: From<CaptureError> + From<ClientError>>(
     client: &Client,
     camera: &mut dyn Camera,
@@ -78,7 +78,11 @@ pub fn expose_in_parts<E: From<CaptureError> + From<ClientError>>(
     let length = usize::from(client.hello().limits.shots_max.max(1));
     for (part, shots) in shots.chunks(length).enumerate() {
         expose(client, camera, shots, image_wait, |record, image| {
-            on_image(part * length + usize::from(record.index), record, image)
+            let (index, asked) = (usize::from(record.index), shots.len());
+            if index >= asked {
+                return Err(CaptureError::Count { reported: index + 1, asked }.into());
+            }
+            on_image(part * length + index, record, image)
         })?;
     }
     Ok(())
@@ -242,7 +246,7 @@ pub(crate) fn one_trigger(shots: &[Shot]) -> Result<(TriggerMode, Micros), Captu
 pub fn check_exposures(camera: &mut dyn Camera, shots: &[Shot]) -> Result<(), CaptureError> {
     let Some(first) = shots.first() else { return Ok(()) };
     match shots.iter().position(|shot| shot.exposure != first.exposure) {
-        Some(index) if camera.sets_exposure() => Err(CaptureError::MixedExposures {
+        Some(index) if camera.sets_exposure(first.mode) => Err(CaptureError::MixedExposures {
             camera: camera.kind(),
             index,
             found: shots[index].exposure.0,

@@ -31,7 +31,7 @@ pub fn exposure(
     image_wait: Duration,
 ) -> Result<Micros, CaptureError> {
     let limits = &client.hello().limits;
-    let own = if camera.sets_exposure() { camera.controls()? } else { Vec::new() };
+    let own = if camera.sets_exposure(shot.mode) { camera.controls()? } else { Vec::new() };
     let (min, max) = within((limits.exposure_min, limits.exposure_max), &own);
     let mut shot = Shot { exposure: shot.exposure.clamp(min, max), ..shot };
     for _ in 0..EXPOSURES_MAX {

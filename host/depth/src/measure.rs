@@ -197,7 +197,8 @@ pub(crate) fn measure_after(
         lost.fraction > LEAST_REPORTED && (lost.reason != Reason::Unsure || validity.valid_fraction == 0.0)
     };
     findings.extend(validity.lost.iter().filter(reported).copied().map(Finding::Lost));
-    if validity.valid_fraction == 0.0 {
+    let is_asked_for = validity.lost.iter().any(|lost| lost.reason == Reason::Unsure);
+    if validity.valid_fraction == 0.0 && !is_asked_for {
         findings.insert(0, Finding::NoDepth);
     }
     if validity.valid_fraction < TELLING {

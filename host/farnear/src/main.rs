@@ -151,7 +151,8 @@ fn main() -> ExitCode {
 /// Parses the command line; some errors get a tip.
 fn parse() -> Arguments {
     Arguments::try_parse().unwrap_or_else(|mut error| {
-        let words: Vec<String> = std::env::args().skip(1).collect();
+        let words: Vec<String> =
+            std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()).collect();
         if let Some(tip) = tips::tip(&error, &Arguments::command(), &words) {
             error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
         }

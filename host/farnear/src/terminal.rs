@@ -163,9 +163,8 @@ impl Progress for Terminal {
 
 impl Questions for Terminal {
     fn ask(&self, question: &str, cancel: &Cancel) -> Result<String, WorkflowError> {
-        say(question);
         let unanswered = || WorkflowError::Unanswered { question: question.trim().into() };
-        std::io::stderr().flush().map_err(|_| unanswered())?;
+        std::io::stderr().write_all(question.as_bytes()).map_err(|_| unanswered())?;
         // Ctrl-C does not end a read, so a thread of its own reads; it ends with the program at the latest.
         let (sender, typed) = channel();
         std::thread::spawn(move || {

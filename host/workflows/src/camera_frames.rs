@@ -75,6 +75,11 @@ pub fn calibrate(settings: &CalibrateCameraRequest, context: &Context<'_>) -> Re
         for (index, file) in files.iter().enumerate() {
             context.cancel.check("reading the exposures")?;
             let image = read_grey(file)?;
+            let holes = image.pixels.iter().filter(|value| !value.is_finite()).count();
+            if holes > 0 {
+                let expected = format!("a value in each pixel; {holes} have none (NaN or transparent)");
+                return Err(WorkflowError::parameter(kind, file.display(), expected));
+            }
             if let Some(white) = image.white_level {
                 check_saturation(kind, index + 1, &image.pixels, white)?;
             }

@@ -48,6 +48,10 @@ impl Positioning {
         if !stage.is_still(self.axis) {
             return None;
         }
+        if self.axis == Axis::SensorFine && stage.fine.waits() {
+            self.waiting_since = Some(now);
+            return None;
+        }
         let error = self.error(stage);
         let at_rest = self.axis != Axis::SensorFine || stage.fine.arrived() && stage.fine.gauge_fresh();
         if at_rest {

@@ -36,6 +36,9 @@ pub fn failure(end: &EventKind) -> Failure {
 
 pub type Answer = Result<Response, RequestError>;
 
+/// After a start the piezo waits so long for the end of a swing.
+pub const AFTER_START_MS: u64 = 200;
+
 pub struct Bench {
     pub rig: Rig,
     pub hardware: Hardware,

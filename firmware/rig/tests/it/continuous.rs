@@ -170,6 +170,7 @@ fn periods_that_pass_during_an_exposure_are_reported_after_it() {
 #[test]
 fn a_run_continues_until_stopped_and_a_pause_restarts_the_period() {
     let mut bench = Bench::new(700.0);
+    bench.run_ms(crate::bench::AFTER_START_MS);
     pair(&mut bench);
     let id = bench.accepted(&run(PERIOD, 0));
     bench.run_ms(1_000);

@@ -1,6 +1,6 @@
 //! The link through the public interface: sessions, repeated requests, stored answers.
 
-use crate::bench::{self, BOOT, Bench, SESSION};
+use crate::bench::{self, AFTER_START_MS, BOOT, Bench, SESSION};
 use farnear_protocol::frame::{self, Header, Kind};
 use farnear_protocol::message::{Axis, EventKind, Failure, ResetCause, SCHEMA_KEY, SettingKey};
 use farnear_protocol::{
@@ -122,6 +122,7 @@ fn events_are_numbered_and_can_be_read_again() {
 #[test]
 fn a_host_that_does_not_listen_loses_events_but_no_answers() {
     let mut bench = Bench::new(0.0);
+    bench.run_ms(AFTER_START_MS);
     let outstanding = u32::from(bench.hello().outstanding);
     bench.answers.clear();
     bench.deaf = true;

@@ -1,6 +1,6 @@
 //! The fine axis and the exposure program through the public interface.
 
-use crate::bench::{self, Bench, SILENCE};
+use crate::bench::{self, AFTER_START_MS, Bench, SILENCE};
 use farnear_protocol::message::{
     Axis, EventKind, Failure, PositionState, ProgramState, Shot, ShotFault, ShotRecord, TriggerMode,
 };
@@ -44,8 +44,24 @@ fn run(bench: &mut Bench, shots: u8) -> (Vec<ShotRecord>, EventKind) {
 }
 
 #[test]
+fn a_move_right_after_a_reset_waits_for_the_piezo_to_be_lowered_and_settles() {
+    let mut bench = Bench::new(700.0);
+    let end = bench.work(&fine(FAR.max(NEAR)));
+    assert!(matches!(end, EventKind::MoveDone { .. }), "{end:?}");
+    let code = bench.hardware.dac;
+    bench.reset(Some(code));
+    let start = bench.now;
+    let end = bench.work(&fine(FAR.max(NEAR)));
+    assert!(matches!(end, EventKind::MoveDone { .. }), "{end:?}");
+    let ms = (bench.now - start) / 1_000;
+    // A ramp of 0.1 s and the swing after it.
+    assert!((300..400).contains(&ms), "{ms} ms");
+}
+
+#[test]
 fn the_piezo_moves_without_homing_and_settles_in_15_ms() {
     let mut bench = Bench::new(700.0);
+    bench.run_ms(AFTER_START_MS);
     for target in [FAR, NEAR, FAR, NEAR] {
         let start = bench.now;
         let end = bench.work(&fine(target));

@@ -305,20 +305,21 @@ impl Camera for GenicamCamera {
                 return Err(CameraError::Trigger { camera: self.kind(), mode: trigger_name(mode) });
             }
         };
-        // Some cameras leave TriggerWidth when their exposure time is set; a software trigger has no width.
-        if exposure.0 > 0 && (mode == TriggerMode::Software || self.sets_exposure()) {
+        // Some cameras leave TriggerWidth when their exposure time is set.
+        if exposure.0 > 0 && self.sets_exposure(mode) {
             self.set(&Setting::ExposureUs(f64::from(exposure.0)))?;
         }
         self.camera.set_trigger(&source).map_err(self.failed())?;
         self.start()
     }
 
-    fn sets_exposure(&mut self) -> bool {
+    fn sets_exposure(&mut self, mode: TriggerMode) -> bool {
         // The bindings report success for absent features.
         let has_mode = self.camera.is_feature_available("ExposureMode").unwrap_or(false);
         let by_pulse =
             has_mode && self.camera.string("ExposureMode").is_ok_and(|mode| mode.as_str() == "TriggerWidth");
-        !by_pulse
+        // A software trigger has no width.
+        mode == TriggerMode::Software || !by_pulse
     }
 
     fn trigger(&mut self, _: u32, _: Micros) -> Result<(), CameraError> {

@@ -211,6 +211,9 @@ pub fn of_picture(picture: GreyImage) -> Result<Image, String> {
     let Samples::Integer(bits) = picture.samples else {
         return Err("a camera's image has integer pixels, this one has float".into());
     };
+    if picture.pixels.iter().any(|value| value.is_nan()) {
+        return Err("a camera's image has a value in each pixel, this one has transparent ones: save it without alpha".into());
+    }
     let full_scale = f32::from(((1u32 << bits) - 1) as u16);
     let pixels = picture.pixels.mapv(|value| (value * full_scale).round() as u16);
     Ok(Image { pixels, bits, coding_variance: picture.coding_variance })

@@ -115,7 +115,7 @@ impl Camera for SelfTimed {
     fn arm(&mut self, _: TriggerMode, _: Micros) -> Result<(), CameraError> {
         Ok(())
     }
-    fn sets_exposure(&mut self) -> bool {
+    fn sets_exposure(&mut self, _: TriggerMode) -> bool {
         true
     }
     fn trigger(&mut self, _: u32, _: Micros) -> Result<(), CameraError> {

@@ -96,7 +96,8 @@ fn a_pair_over_gige_equals_that_of_the_endpoint() {
     // One percent packet loss, with resends.
     let rig = Rig::start(5, &["--gige-lost", "10"]);
     let mut camera = rig.gige();
-    assert!(!camera.sets_exposure(), "its exposure is the trigger's pulse");
+    assert!(!camera.sets_exposure(TriggerMode::Hardware), "its exposure is the trigger's pulse");
+    assert!(camera.sets_exposure(TriggerMode::Software), "a software trigger has no width");
     let by_gige = pair(&rig.client(), &mut camera).unwrap();
     assert!(by_gige.far.image == by_tcp.far.image && by_gige.near.image == by_tcp.near.image);
     assert!(by_gige.far.image != by_gige.near.image);

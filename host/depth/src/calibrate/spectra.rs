@@ -19,7 +19,7 @@ const RINGS: usize = 128;
 pub enum SpectrumError {
     #[error("{width}x{height} px are too few, at least 32x32 are needed")]
     TooSmall { width: usize, height: usize },
-    #[error("the pixel in column {column}, row {row} is not finite")]
+    #[error("the pixel in column {column}, row {row} has no value (NaN or transparent): crop or fill it")]
     NotFinite { column: usize, row: usize },
     #[error("it is constant or dark, without texture to compare")]
     Constant,

@@ -259,8 +259,10 @@ fn decode_page(file: impl Read + Seek, size: u64, page: &Page, signed: Signed) -
         return Err(format!("its {width}x{height} px in {} planes are more than it can hold", layout.planes));
     }
     let planes = if layout.plane_stride.is_some() && layout.planes > 1 { layout.planes } else { 1 };
-    let channels =
-        if planes > 1 { planes.min(colours + usize::from(alpha)) } else { usize::from(colour.num_samples()) };
+    let samples = if planes > 1 { planes } else { usize::from(colour.num_samples()) };
+    // A sample that is not stated as alpha has no meaning.
+    let channels = samples.min(colours + usize::from(alpha));
+    let order = (planes, samples, channels);
     let (width, height) = (width as usize, height as usize);
     let data = match data {
         DecodingResult::I8(v) => DecodingResult::U8(v.into_iter().map(i8::cast_unsigned).collect()),
@@ -269,28 +271,22 @@ fn decode_page(file: impl Read + Seek, size: u64, page: &Page, signed: Signed) -
         other => other,
     };
     let values = match data {
-        DecodingResult::U8(v) if matches!(colour.bit_depth(), 1 | 2 | 4) && planes == 1 && channels == 1 => {
+        DecodingResult::U8(v) if matches!(colour.bit_depth(), 1 | 2 | 4) && planes == 1 && samples == 1 => {
             let mut samples = unpacked(&v, width, height, colour.bit_depth())?;
             if is_bool_of_tifffile(&page.directory) {
                 samples.iter_mut().for_each(|sample| *sample = 255 - *sample);
             }
             Values::U8(samples)
         }
-        DecodingResult::U8(v) if colour.bit_depth() == 8 => Values::U8(interleaved(v, planes, channels)),
-        DecodingResult::U16(v) if colour.bit_depth() == 16 => Values::U16(interleaved(v, planes, channels)),
+        DecodingResult::U8(v) if colour.bit_depth() == 8 => Values::U8(interleaved(v, order)),
+        DecodingResult::U16(v) if colour.bit_depth() == 16 => Values::U16(interleaved(v, order)),
         DecodingResult::U32(v) => {
             let full = f64::from(u32::MAX);
-            Values::U32(
-                interleaved(v, planes, channels).into_iter().map(|v| (f64::from(v) / full) as f32).collect(),
-            )
+            Values::U32(interleaved(v, order).into_iter().map(|v| (f64::from(v) / full) as f32).collect())
         }
-        DecodingResult::F16(v) => {
-            Values::F32(interleaved(v, planes, channels).into_iter().map(f32::from).collect())
-        }
-        DecodingResult::F32(v) => Values::F32(interleaved(v, planes, channels)),
-        DecodingResult::F64(v) => {
-            Values::F32(interleaved(v, planes, channels).into_iter().map(|v| v as f32).collect())
-        }
+        DecodingResult::F16(v) => Values::F32(interleaved(v, order).into_iter().map(f32::from).collect()),
+        DecodingResult::F32(v) => Values::F32(interleaved(v, order)),
+        DecodingResult::F64(v) => Values::F32(interleaved(v, order).into_iter().map(|v| v as f32).collect()),
         _ => return Err(format!("its samples are {colour:?}: convert it to grey or RGB of 8 or 16 bits")),
     };
     let white_level = camera_white(&page.directory);
@@ -315,10 +311,13 @@ fn is_bool_of_tifffile(directory: &Directory) -> bool {
     directory.bits == 1 && directory.photometric == 0 && described
 }
 
-/// Pixel by pixel, the first `kept` planes.
-fn interleaved<T: Copy>(values: Vec<T>, planes: usize, kept: usize) -> Vec<T> {
+/// Pixel by pixel, the first `kept` of the samples.
+fn interleaved<T: Copy>(values: Vec<T>, (planes, samples, kept): (usize, usize, usize)) -> Vec<T> {
     if planes == 1 {
-        return values;
+        if kept == samples {
+            return values;
+        }
+        return values.chunks_exact(samples).flat_map(|pixel| &pixel[..kept]).copied().collect();
     }
     let size = values.len() / planes;
     (0..size)

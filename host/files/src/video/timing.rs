@@ -61,9 +61,8 @@ impl Timing {
             .stdin(Stdio::null())
             .output()
             .ok()?;
-        let Listed { tick_s, ticks, aspect } = parsed(&String::from_utf8_lossy(&listed.stdout))?;
-        let timing = Self::of_times(ticks.into_iter().map(|tick| tick as f64 * tick_s).collect())?;
-        Some(Self { aspect, choice: choice(&String::from_utf8_lossy(&listed.stderr)), ..timing })
+        let packets = parsed(&String::from_utf8_lossy(&listed.stdout))?;
+        Some(Self { choice: choice(&String::from_utf8_lossy(&listed.stderr)), ..packets.timing()? })
     }
 
     fn of_times(mut times: Vec<f64>) -> Option<Self> {
@@ -185,16 +184,31 @@ fn size(text: &str) -> &str {
 #[derive(Debug, PartialEq)]
 struct Listed {
     tick_s: f64,
-    /// Presentation times. Packets of AVI files and MPEG program streams may have none: decoding times then.
-    ticks: Vec<i64>,
+    decoded: Vec<i64>,
+    /// Packets of AVI files and MPEG program streams may have no presentation time.
+    presented: Vec<i64>,
     aspect: f64,
+}
+
+impl Listed {
+    /// By presentation times. If some are missing, regular decoding times are better: they begin before the first frame is
+    /// shown, which counts for irregular ones only.
+    fn timing(&self) -> Option<Timing> {
+        let of = |ticks: &[i64]| {
+            let timing = Timing::of_times(ticks.iter().map(|tick| *tick as f64 * self.tick_s).collect())?;
+            Some(Timing { aspect: self.aspect, ..timing })
+        };
+        let is_whole = self.presented.len() >= self.decoded.len();
+        let decoded = of(&self.decoded).filter(|timing| timing.regular && !is_whole);
+        decoded.or_else(|| of(&self.presented)).or_else(|| of(&self.decoded))
+    }
 }
 
 fn parsed(text: &str) -> Option<Listed> {
     /// ffmpeg's mark of a packet without a time.
     const NO_TIME: i64 = i64::MIN;
     let (mut tick_s, mut aspect) = (None, 1.0);
-    let mut packets = Vec::new();
+    let (mut decoded, mut presented) = (Vec::new(), Vec::new());
     let ratio = |text: &str| {
         let (over, under) = text.trim().split_once('/')?;
         let ratio = over.parse::<f64>().ok()? / under.parse::<f64>().ok()?;
@@ -208,15 +222,12 @@ fn parsed(text: &str) -> Option<Listed> {
         } else if !line.starts_with('#') {
             // Stream, decoding time, presentation time, duration, size, checksum.
             let mut times = line.split(',').skip(1).map(|cell| cell.trim().parse::<i64>());
-            if let (Some(Ok(decoded)), Some(Ok(presented))) = (times.next(), times.next()) {
-                packets.push([decoded, presented]);
+            for ticks in [&mut decoded, &mut presented] {
+                ticks.extend(times.next().and_then(Result::ok).filter(|tick| *tick != NO_TIME));
             }
         }
     }
-    let are_presented = packets.iter().all(|[_, presented]| *presented != NO_TIME);
-    let times = packets.iter().map(|[decoded, presented]| if are_presented { *presented } else { *decoded });
-    let ticks = times.filter(|tick| *tick != NO_TIME).collect();
-    Some(Listed { tick_s: tick_s?, ticks, aspect })
+    Some(Listed { tick_s: tick_s?, decoded, presented, aspect })
 }
 
 #[cfg(test)]
@@ -252,10 +263,20 @@ mod tests {
             format!("0, {n}, {presented}, 1, 640, 0x96991d38, F=0x0\n")
         };
         let list = "#tb 0: 1/25\n".to_owned() + &(0..60).map(packet).collect::<String>();
-        let Listed { tick_s, ticks, .. } = parsed(&list).expect("a list");
-        let timing = Timing::of_times(ticks.iter().map(|tick| *tick as f64 * tick_s).collect());
-        let timing = timing.expect("times");
+        let timing = parsed(&list).expect("a list").timing().expect("times");
         assert_eq!((timing.regular, timing.rate_hz, timing.frames), (true, 25.0, 60));
+    }
+
+    #[test]
+    fn irregular_decoding_times_replace_no_presentation_times() {
+        let packet = |n: i64| {
+            let time = 40 * n + 15 * (n % 3);
+            let presented = if n == 30 { i64::MIN } else { time };
+            format!("0, {}, {presented}, 40, 640, 0x96991d38\n", time - 80)
+        };
+        let list = "#tb 0: 1/1000\n".to_owned() + &(0..60).map(packet).collect::<String>();
+        let timing = parsed(&list).expect("a list").timing().expect("times");
+        assert_eq!((timing.regular, timing.first_s, timing.frames), (false, 0.0, 59));
     }
 
     #[test]
@@ -264,9 +285,11 @@ mod tests {
             "#tb 0: 1/90000\n#sar 0: 64/45\n0, 0, 0, 3600, 28, 0xd3\n0, -9223372036854775808, -9223372036854775808, 3600, 11, 0xe3\n0, 3600, 3600, 3600, 9, 0x1\n",
         )
         .expect("a list");
-        assert_eq!(listed, Listed { tick_s: 1.0 / 90_000.0, ticks: vec![0, 3600], aspect: 64.0 / 45.0 });
-        let wide =
-            Timing { aspect: listed.aspect, ..Timing::of_times(vec![0.0, 0.04, 0.08]).expect("times") };
+        let ticks = vec![0, 3600];
+        let expected =
+            Listed { tick_s: 1.0 / 90_000.0, decoded: ticks.clone(), presented: ticks, aspect: 64.0 / 45.0 };
+        assert_eq!(listed, expected);
+        let wide = listed.timing().expect("times");
         assert_eq!(wide.output_arguments()[1], "scale=round(iw*sar):ih,setsar=1");
         assert!(wide.remark().expect("a remark").contains("1.422 times as wide"));
         // A video that is rotated when shown is scaled by the inverse ratio.

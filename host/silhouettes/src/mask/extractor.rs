@@ -83,7 +83,7 @@ impl ExtractorSettings {
         Self {
             background,
             cleaning: Cleaning::for_size(size),
-            subject: SubjectSettings::for_size(size),
+            subject: SubjectSettings { usual_share: 0.1, ..SubjectSettings::for_size(size) },
             learning_frames: 10,
             scene_change_share: 0.6,
             learning: Learning::default(),

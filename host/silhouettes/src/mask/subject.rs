@@ -64,7 +64,8 @@ pub struct SubjectSettings {
     pub widest_break_px: usize,
     /// A second person counts from this share of the largest's area.
     pub rival_share: f64,
-    /// A person counts from this share of the usual area of earlier ones; less is noise or a rest of a person.
+    /// A person counts from this share of the usual area of earlier ones; less is noise of a background model, or a rest of a
+    /// person. 0 for masks that are given.
     pub usual_share: f64,
     /// Frames without a person after which the last place is forgotten.
     pub forget_after_frames: u32,
@@ -81,7 +82,7 @@ impl SubjectSettings {
             smallest_fragment_px: (pixels / 10_000).max(1),
             widest_break_px: height / 40,
             rival_share: 0.3,
-            usual_share: 0.1,
+            usual_share: 0.0,
             forget_after_frames: 10,
             forget_area_after_frames: 500,
         }
@@ -100,8 +101,8 @@ pub struct Subject {
 
 /// Subjects after which their usual area and number of pieces are known.
 const KNOWN_AFTER: usize = 10;
-/// Subjects whose usual area is remembered.
-const REMEMBERED: usize = 100;
+/// Subjects whose usual area is remembered: few, for people who walk away.
+const REMEMBERED: usize = 20;
 /// Mean number of pieces above which masks are doubtful. Measured on public videos: mostly 1 to 4; 16 with a camera in the hand,
 /// 14 with a drifting exposure.
 const MOST_PIECES: f64 = 5.0;
@@ -139,7 +140,7 @@ impl SubjectChooser {
         let pieces = self.pieces as f64 / self.subjects.max(1) as f64;
         (self.subjects >= KNOWN_AFTER && pieces > MOST_PIECES).then(|| {
             format!(
-                "the person is in {pieces:.0} pieces on average, so that masks and answers are doubtful: does the camera move, does \
+                "the person is in {pieces:.1} pieces on average, so that masks and answers are doubtful: does the camera move, does \
                  its exposure drift, or do the clothes resemble the background?"
             )
         })
@@ -222,7 +223,7 @@ mod tests {
     }
 
     fn chooser() -> SubjectChooser {
-        SubjectChooser::new(SubjectSettings::for_size(SIZE))
+        SubjectChooser::new(SubjectSettings { usual_share: 0.1, ..SubjectSettings::for_size(SIZE) })
     }
 
     #[test]
@@ -291,10 +292,34 @@ mod tests {
     }
 
     #[test]
+    fn a_person_who_walks_away_is_always_chosen() {
+        let mut chooser = chooser();
+        let sides = |frame: u32| {
+            let share = 0.95_f64.powf(0.5 * f64::from(frame));
+            [200.0_f64, 100.0].map(|side| (side * share).round() as usize)
+        };
+        for frame in std::iter::repeat_n(0, 100).chain(1..=60) {
+            let [height, width] = sides(frame);
+            let subject = chooser.choose(people(&[[20, 100, 20 + height, 100 + width]]).view());
+            assert!(subject.bounds.is_some(), "frame {frame}");
+        }
+    }
+
+    #[test]
+    fn small_people_of_given_masks_count() {
+        let mut chooser = SubjectChooser::new(SubjectSettings::for_size(SIZE));
+        for _ in 0..30 {
+            chooser.choose(people(&[[20, 100, 220, 200]]).view());
+        }
+        let far = people(&[[100, 100, 120, 110]]);
+        assert_eq!(chooser.choose(far.view()).mask, far);
+    }
+
+    #[test]
     fn people_in_many_pieces_make_the_recording_doubtful() {
         let stripes: Vec<[usize; 4]> =
             (0..8).map(|stripe| [40 + 14 * stripe, 100, 50 + 14 * stripe, 140]).collect();
-        for (pieces, expected) in [(1, None), (4, None), (8, Some("in 8 pieces on average"))] {
+        for (pieces, expected) in [(1, None), (4, None), (8, Some("in 8.0 pieces on average"))] {
             let mut chooser = chooser();
             for _ in 0..20 {
                 chooser.choose(people(&stripes[..pieces]).view());

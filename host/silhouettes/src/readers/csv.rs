@@ -55,10 +55,15 @@ pub fn read(bytes: &[u8], choices: Choices) -> Result<Found, RecordingError> {
     if let Some(found) = layered(&rows)? {
         return Ok(found);
     }
-    match table::read(columns, below, choices)? {
-        Some(found) => Ok(found),
-        None => plain(columns, below),
+    let mut found = match table::read(columns, below, choices)? {
+        Some(found) => found,
+        None => plain(columns, below)?,
+    };
+    match rate_hz(columns, below) {
+        Some(rate_hz) => found.rate_hz = rate_hz,
+        None => found.remarks.push("the file states no frame rate".into()),
     }
+    Ok(found)
 }
 
 /// DeepLabCut's rows `scorer`, `individuals` (of several), `bodyparts` and `coords` as one row of `INDIVIDUAL:PART_x`.
@@ -113,17 +118,15 @@ fn plain(columns: &StringRecord, rows: &[StringRecord]) -> Result<Found, Recordi
         check_width(row, columns)?;
         frames.push(points(row, &places)?);
     }
-    let rate_hz = rate_hz(columns, rows);
-    let unknown = "the file states no frame rate";
     Ok(Found {
         others: Vec::new(),
         planar: false,
         names: markers.into_iter().map(|(name, _)| name).collect(),
-        rate_hz: rate_hz.unwrap_or_default(),
+        rate_hz: 0.0,
         frames,
         unit: Known { value: Unit { mm }, source: source.clone() },
         up: Known { value: up, source },
-        remarks: rate_hz.is_none().then(|| unknown.to_owned()).into_iter().collect(),
+        remarks: Vec::new(),
     })
 }
 

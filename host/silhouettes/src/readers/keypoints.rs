@@ -35,7 +35,7 @@ const HEAD: [usize; 6] = [0, 1, 2, 3, 4, 5];
 const ANKLES: [usize; 2] = [20, 21];
 const SHOULDERS: [usize; 2] = [8, 9];
 const HIPS: [usize; 2] = [16, 17];
-/// Frames with values that are no person's points, per frame with a person, in a file that holds something else.
+/// Entries with values that are no person's points, per frame with a person, in a file that holds something else.
 const MOST_UNREAD: usize = 9;
 /// Coordinates up to this are shares of the picture's sides, not pixels; points may be outside, and few far outside.
 const NORMALISED: f64 = 3.0;
@@ -44,7 +44,7 @@ const MOST_FAR_OUTSIDE: f64 = 0.05;
 const USUAL_ASPECT: f64 = 16.0 / 9.0;
 
 pub fn read(bytes: &[u8], choices: Choices) -> Result<Found, RecordingError> {
-    found(Document::parse(bytes)?, choices)
+    found(Document::parse(bytes)?, choices, None)
 }
 
 /// Reads names and contents of a folder's JSON files, one frame each, in order.
@@ -52,10 +52,11 @@ pub fn read_files<'a>(
     files: impl IntoIterator<Item = (&'a str, &'a [u8])>,
     choices: Choices,
 ) -> Result<Found, RecordingError> {
-    found(Document::of_files(files)?, choices)
+    found(Document::of_files(files)?, choices, None)
 }
 
-fn found(document: Document, choices: Choices) -> Result<Found, RecordingError> {
+/// The first remark is `about` the points, or about their labels or layout.
+fn found(document: Document, choices: Choices, about: Option<String>) -> Result<Found, RecordingError> {
     let Document { mut frames, size, has_wide_gaps, unread, .. } = document;
     let labelled = labels::order(&mut frames)?;
     let everyone = || frames.iter().flatten();
@@ -64,7 +65,7 @@ fn found(document: Document, choices: Choices) -> Result<Found, RecordingError> 
     let first = everyone().next().filter(|_| is_read).ok_or_else(|| {
         let what = match with_people {
             0 => "it holds no person's points".to_owned(),
-            _ => format!("{with_people} of its frames hold a person's points, and {unread} other values"),
+            _ => format!("it holds people's points in {with_people} frames, other values in {unread}"),
         };
         let counts: Vec<String> = layouts::LAYOUTS.iter().map(|layout| layout.count.to_string()).collect();
         let reason = format!(
@@ -77,12 +78,13 @@ fn found(document: Document, choices: Choices) -> Result<Found, RecordingError> 
     let in_picture = !has_depth && !spatial::are_centred(everyone());
     let layout = if has_depth { spatial::layout(everyone())? } else { first.layout };
     let seen = if has_depth { "in three dimensions" } else { "seen from one side" };
-    let about =
-        labelled.unwrap_or_else(|| format!("{} keypoints of the layout {}", layout.count, layout.name));
+    let about = about
+        .or(labelled)
+        .unwrap_or_else(|| format!("{} keypoints of the layout {}", layout.count, layout.name));
     let mut remarks = vec![format!("{about}, {seen}")];
     if unread > 0 {
         remarks.push(format!(
-            "{unread} frames hold values that are not the points of a person in a known layout: they are taken as empty"
+            "values that are not the points of a person in a known layout are taken as empty: {unread} entries"
         ));
     }
     if has_wide_gaps {

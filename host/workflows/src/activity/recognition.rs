@@ -275,7 +275,7 @@ impl<'m> Recognition<'m> {
         let passages = self.person.passages();
         let joined = (passages > 1).then(|| {
             format!(
-                "the person leaves and returns: {passages} passages, which the answer for the whole joins; use `windows` and \
+                "the person is not seen between {passages} passages, which the answer for the whole joins; use `windows` and \
                  `segments`, or cut the masks (farnear silhouettes passages) and recognise each passage"
             )
         });
@@ -447,8 +447,11 @@ mod tests {
         let context = Context::unattended();
         while recognition.next(&context).expect("an answer").is_some() {}
         let remarks = recognition.remarks.join("\n");
-        assert!(remarks.contains("view 1: the person is in 8 pieces on average"), "{remarks}");
-        assert!(remarks.contains("2 passages") && remarks.contains("silhouettes passages"), "{remarks}");
+        assert!(remarks.contains("view 1: the person is in 8.0 pieces on average"), "{remarks}");
+        assert!(
+            remarks.contains("between 2 passages") && remarks.contains("silhouettes passages"),
+            "{remarks}"
+        );
     }
 
     #[test]

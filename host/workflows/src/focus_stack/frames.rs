@@ -173,7 +173,7 @@ where
                 let link = comparison.link(nearest, index)?;
                 if few_foreign {
                     let reason = format!(
-                        "it shows another scene, is turned, or is far out of focus or black (correlation with its neighbour {:.2}, of the others {:.2})",
+                        "it shows another scene, or is turned, black or far out of focus (correlation with its neighbour {:.2}, of the others {:.2})",
                         link.correlation, scene.usual
                     );
                     frames.left_out.push((index, reason));

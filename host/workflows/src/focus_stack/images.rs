@@ -73,8 +73,7 @@ pub(crate) fn fill_specks(image: &mut Array2<f32>) -> Vec<(usize, usize)> {
     specks
 }
 
-/// Adds an image's specks to the mask `unseen`, where the lens' distortion and the warp move them. The measure refuses images
-/// of another size.
+/// Adds an image's specks to the mask `unseen`, where the lens' distortion and the warp move them.
 pub(super) fn mark_specks(
     unseen: &mut Option<Array2<bool>>,
     dim: (usize, usize),

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use farnear_capture::{expose::CaptureError, plan::PlanError, record::begin_folder, sequence::ShotDefaults};
+use farnear_capture::{record::begin_folder, sequence::ShotDefaults};
 use farnear_depth::optics::Optics;
 use farnear_protocol::{Nanometres, message::Axis};
 use schemars::JsonSchema;
@@ -17,8 +17,9 @@ use super::{
 use crate::{
     calibrate::stack::{CalibrateStackRequest, StackFigures, calibrate},
     context::Context,
-    error::{Result, WorkflowError},
+    error::Result,
     optics::GivenOptics,
+    parameters::within,
     request::{PathKind, Request},
 };
 
@@ -82,10 +83,7 @@ impl Request for RigStackRequest {
     type Figures = StackFigures;
 
     fn check(&self) -> Result<()> {
-        if self.slices >= FEWEST {
-            return Ok(());
-        }
-        Err(WorkflowError::parameter("slices", self.slices, format!("expected {FEWEST} or more")))
+        within("slices", self.slices, &(FEWEST..=sequence::STEPS_MAX), "")
     }
 
     fn run(&self, context: &Context<'_>) -> Result<StackFigures> {
@@ -102,10 +100,6 @@ pub fn run(settings: &RigStackRequest, context: &Context<'_>) -> Result<StackFig
     let optics = given.optics;
     let folder = begin_folder(&settings.out)?;
     let mut rig = settings.camera.connect(&settings.rig, Some(&given), context)?;
-    let (asked, max) = (settings.slices, rig.rig.client.hello().limits.shots_max);
-    if asked > usize::from(max) {
-        return Err(CaptureError::from(PlanError::Shots { asked, max }).into());
-    }
     let focused = focus::search(
         &mut rig,
         &optics,

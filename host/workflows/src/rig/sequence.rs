@@ -28,7 +28,7 @@ use crate::{
 };
 
 /// Most positions of a stack.
-const STEPS_MAX: usize = 10_000;
+pub(super) const STEPS_MAX: usize = 10_000;
 
 /// Run an exposure program on the board: shots from a file, or a focus stack. Write the images and capture.toml with the position
 /// asked and measured, trigger and strobe times of each shot.
@@ -219,9 +219,8 @@ fn run_once(
     let EquippedRig { camera, rig } = rig;
     let wait = settings.camera.image_wait;
     expose_in_parts(&rig.client, camera.as_mut(), shots, wait, |index, record, image| -> Result<()> {
-        let asked = shots.len();
-        let shot = shots.get(index).ok_or(CaptureError::Count { reported: index + 1, asked })?;
-        let name = name(image_name(index, asked, &record, shot.repeat));
+        let shot = &shots[index];
+        let name = name(image_name(index, shots.len(), &record, shot.repeat));
         write_image(&taken.folder, &name, &image)?;
         taken.first.get_or_insert(image);
         taken.shots.push(SequenceShot { name, record, mode: shot.mode });

@@ -361,7 +361,7 @@ mod tests {
         let figures = extract(&request, &Context::unattended()).expect("masks");
         assert_eq!((figures.silhouettes, figures.fragments), (25, 25));
         let remarks = figures.remarks.join("\n");
-        assert!(remarks.contains("walk.y4m: the person is in 7 pieces on average"), "{remarks}");
+        assert!(remarks.contains("walk.y4m: the person is in 7.0 pieces on average"), "{remarks}");
         let index = std::fs::read_to_string(out.join("silhouettes.toml")).expect("an index");
         let index: toml::Table = index.parse().expect("an index");
         assert_eq!(index["rate_hz"].as_float(), Some(50.0));

@@ -53,3 +53,40 @@ fn a_piezo_whose_code_is_unknown_is_left_where_it_is() {
     assert!(!piezo.is_moving(), "nothing is output");
     assert_eq!((piezo.extension(), piezo.driven_from()), (None, None));
 }
+
+#[test]
+fn a_move_after_a_start_waits_for_the_end_of_a_swing() {
+    let mut plant = Plant::new(NOMINAL, 5);
+    for _ in 0..5_000 {
+        plant.tick(Some(20_000));
+    }
+    // The power fails and returns: the DAC is at 0, and the stack swings.
+    let mut piezo = Piezo::new(Settings::DEFAULT.fine);
+    piezo.start_at(Some(0));
+    piezo.go(Nanometres(100_000));
+    for _ in 1..SWINGING_TICKS {
+        piezo.sense(plant.gauge());
+        assert!(piezo.waits(), "{} nm", plant.position);
+        assert_eq!(piezo.act(), Some(0));
+        plant.tick(Some(0));
+    }
+    for _ in 0..100 {
+        piezo.sense(plant.gauge());
+        plant.tick(piezo.act());
+    }
+    assert!(!piezo.waits() && (plant.position - 100_000.0).abs() < 100.0, "{} nm", plant.position);
+}
+
+#[test]
+fn a_move_that_is_stopped_while_it_waits_has_no_target() {
+    let mut plant = Plant::new(NOMINAL, 5);
+    let mut piezo = Piezo::new(Settings::DEFAULT.fine);
+    piezo.start_at(Some(0));
+    piezo.go(Nanometres(100_000));
+    for _ in 0..10 {
+        piezo.sense(plant.gauge());
+        plant.tick(piezo.act());
+    }
+    piezo.hold();
+    assert!(piezo.target() == Settings::DEFAULT.fine.min && piezo.arrived(), "{}", piezo.target().0);
+}

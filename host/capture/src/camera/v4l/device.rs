@@ -239,7 +239,7 @@ impl Camera for V4lCamera {
         self.restart()
     }
 
-    fn sets_exposure(&mut self) -> bool {
+    fn sets_exposure(&mut self, _: TriggerMode) -> bool {
         self.control_of(&Setting::ExposureUs(0.0)).is_some()
     }
 

@@ -73,6 +73,14 @@ fn colours_with_a_sample_of_unknown_meaning_are_read() {
 }
 
 #[test]
+fn a_fourth_sample_counts_only_if_it_is_stated_as_alpha() {
+    let page = Page { strips: vec![vec![30, 60, 90, 0, 60, 90, 120, 8]], ..Page::grey(2, 1, 8, Vec::new()) };
+    let page = page.with(262, &[2]).with(258, &[8, 8, 8, 8]).with(277, &[4]);
+    assert_eq!(read(&tiff(CLASSIC, std::slice::from_ref(&page))), array![[60.0, 90.0]]);
+    assert!(read(&tiff(CLASSIC, &[page.with(338, &[2])]))[(0, 0)].is_nan());
+}
+
+#[test]
 fn bool_arrays_of_tifffile_are_white_where_true() {
     let page = Page::grey(3, 1, 1, vec![0b1010_0000]).with(262, &[0]);
     assert_eq!(read(&tiff(CLASSIC, std::slice::from_ref(&page))), array![[0.0, 255.0, 0.0]]);

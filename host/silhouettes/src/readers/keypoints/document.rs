@@ -89,7 +89,7 @@ pub struct Document {
     pub size: Option<[f64; 2]>,
     /// Whether gaps in the numbers are too long to be filled.
     pub has_wide_gaps: bool,
-    /// Frames with values that are no person's points.
+    /// Entries (frames, people of a picture or a track) with values that are no person's points.
     pub unread: usize,
     /// A list, whose items may be frames, or people of one frame.
     is_list: bool,
@@ -190,7 +190,7 @@ impl Document {
                     return self.frames_of(items);
                 }
                 if is_frame(map) {
-                    let frame = self.frame(value);
+                    let frame = self.entry(value);
                     self.frames.push(frame);
                     return;
                 }
@@ -201,7 +201,7 @@ impl Document {
                 let mut frames: Named = BTreeMap::new();
                 for (name, frame) in map {
                     if frame.as_object().is_some_and(is_frame) || frame.is_array() {
-                        frames.entry(split(name)).or_default().extend(self.frame(frame));
+                        frames.entry(split(name)).or_default().extend(self.entry(frame));
                     }
                 }
                 self.numbered(frames);
@@ -217,7 +217,7 @@ impl Document {
             return;
         }
         for item in items {
-            let frame = self.frame(item);
+            let frame = self.entry(item);
             self.frames.push(frame);
         }
     }
@@ -238,8 +238,9 @@ impl Document {
             let Some(picture) = picture_of(item) else { continue };
             let is_coco = item.get("image_id").is_some();
             let key = split(names.get(&picture).unwrap_or(&picture));
-            let person = self.person(item).map(|person| if is_coco { person.scored() } else { person });
-            frames.entry(key).or_default().extend(person);
+            let people = self.entry(item).into_iter();
+            let people = people.map(|person| if is_coco { person.scored() } else { person });
+            frames.entry(key).or_default().extend(people);
         }
         self.numbered(frames);
     }
@@ -252,10 +253,10 @@ impl Document {
         for (name, inner) in outer {
             for (own, value) in inner.as_object().into_iter().flatten() {
                 let (id, frame) = if are_frames { (own, name) } else { (name, own) };
-                let person = self.person(value);
-                let person =
-                    person.map(|person| Person { id: id.parse().ok().or(person.id), ..person.scored() });
-                frames.entry(split(frame)).or_default().extend(person);
+                let people = self.entry(value).into_iter();
+                let people =
+                    people.map(|person| Person { id: id.parse().ok().or(person.id), ..person.scored() });
+                frames.entry(split(frame)).or_default().extend(people);
             }
         }
         self.numbered(frames);
@@ -277,7 +278,7 @@ impl Document {
         }
     }
 
-    fn frame(&mut self, value: &Value) -> Vec<Person> {
+    fn entry(&mut self, value: &Value) -> Vec<Person> {
         let people = self.people(value);
         self.unread += usize::from(people.is_empty() && holds_values(value));
         people

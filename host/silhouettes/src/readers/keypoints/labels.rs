@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::{
     document::{Person, Raw},
-    layouts::{LAYOUTS, Layout, NAMED, NAMES},
+    layouts::{Layout, NAMED, NAMES},
 };
 use crate::{readers::recording::RecordingError, silhouette::aliases};
 
@@ -58,24 +58,25 @@ pub fn order(frames: &mut [Vec<Person>]) -> Result<Option<String>, RecordingErro
     Ok(Some(order.about))
 }
 
-/// The layout of as many points as the numbers reach, if everybody has them all; else the smallest one from COCO on.
+/// The layout of as many points as the numbers reach; COCO for fewer, except if everybody has them all.
 fn by_number(labels: &[String], frames: &[Vec<Person>]) -> Option<Order> {
     let ids: Vec<usize> = labels.iter().map(|label| label.parse().ok()).collect::<Option<_>>()?;
     let last = *ids.iter().max()?;
     let people = || frames.iter().flatten().filter(|person| !person.labels.is_empty());
+    let most = people().map(|person| person.labels.len()).max()?;
     // Some programs count from 1.
-    let from_one = ids.iter().min() == Some(&1) && people().any(|person| person.labels.len() == last);
-    let first = usize::from(from_one);
+    let first = usize::from(ids.iter().min() == Some(&1) && Layout::of(last).is_some());
     let count = last.checked_add(1)? - first;
-    // Other numbers are not those of keypoints.
-    if ids.len() <= count / 2 {
+    // Other numbers are not those of keypoints, or run through the file.
+    if 2 * most <= count {
         return None;
     }
     let is_whole = people().all(|person| person.labels.len() == count);
-    let layout = Layout::of(count)
-        .filter(|_| is_whole)
-        .or_else(|| LAYOUTS.iter().find(|layout| layout.count >= count.max(USUAL)))?;
-    let about = format!("keypoints by their numbers, up to {last}, in the layout {}", layout.name);
+    let layout = Layout::of(if count < USUAL && !is_whole { USUAL } else { count })?;
+    let about = format!(
+        "keypoints by their numbers, from {first} up to {last}, in the layout {} (a guess)",
+        layout.name
+    );
     let places = labels.iter().cloned().zip(ids.iter().map(|id| id - first)).collect();
     Some(Order { layout, places, about })
 }

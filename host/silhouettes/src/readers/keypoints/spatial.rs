@@ -2,7 +2,7 @@
 
 use super::{
     document::{Person, Raw},
-    layouts::{HUMAN36M, Layout},
+    layouts::{HUMAN36M, Layout, NAMED},
 };
 use crate::readers::recording::RecordingError;
 
@@ -32,14 +32,21 @@ pub fn has_depth<'a>(people: impl Iterator<Item = &'a Person> + Clone) -> bool {
     if people.clone().any(|person| person.layout.has_picture_depth()) {
         return are_centred(people);
     }
-    let thirds: Vec<&Raw> = seen(people).into_iter().filter(|point| point.third.is_some()).collect();
+    let thirds: Vec<&Raw> = seen(people.clone()).into_iter().filter(|point| point.third.is_some()).collect();
     let is_visibility = |point: &Raw| point.third.is_some_and(|v| v == 0.0 || v == 1.0 || v == 2.0);
     let is_outside = |point: &Raw| match (point.third, point.sure) {
         (Some(third), Some(sure)) => third != sure,
         (Some(third), None) => !(0.0..=HIGHEST_CONFIDENCE).contains(&third),
         (None, _) => false,
     };
-    share(&thirds, |point| !is_visibility(point)) >= LEAST_SHARE && share(&thirds, is_outside) >= LEAST_SHARE
+    // A body in metres would be longer. These are shares of a picture, as of MediaPipe, or about the hips.
+    let is_near =
+        |point: &Raw| point.in_space().is_some_and(|point| point.iter().all(|value| value.abs() <= 1.0));
+    let are_near =
+        people.clone().all(|person| *person.layout == NAMED) && share(&thirds, is_near) >= 1.0 - LEAST_SHARE;
+    share(&thirds, |point| !is_visibility(point)) >= LEAST_SHARE
+        && share(&thirds, is_outside) >= LEAST_SHARE
+        && (!are_near || are_centred(people))
 }
 
 /// The order in which left and right limbs are equally long.

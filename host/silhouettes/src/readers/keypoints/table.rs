@@ -22,7 +22,7 @@ use crate::{
 const CONFIDENCES: [&str; 5] = ["likelihood", "score", "confidence", "conf", "visibility"];
 /// MocapNET writes x, y and the visibility before the name.
 const MOCAPNET: [&str; 3] = ["2DX_", "2DY_", "visible_"];
-const FRAMES: [&str; 3] = ["frame_idx", "frameNumber", "frame"];
+const FRAMES: [&str; 6] = ["frame_idx", "frameNumber", "frame", "frame_number", "frame_id", "frame_index"];
 const PEOPLE: [&str; 4] = ["track", "track_id", "person_id", "skeletonID"];
 
 struct Column {
@@ -40,7 +40,10 @@ pub fn read(
     if columns.iter().any(|column| coordinate(column).is_some_and(|(_, axis)| axis == 2)) {
         return Ok(None);
     }
-    let points: Vec<Column> = markers_of(columns, field)?
+    let is_point = |name: &str| columns.iter().filter_map(coordinate).any(|(own, _)| own == name);
+    // One kind counts: some tables have a score and a visibility of each point.
+    let kind = columns.iter().filter_map(confidence).find_map(|(name, kind)| is_point(name).then_some(kind));
+    let points: Vec<Column> = markers_of(columns, |column| field(column, kind))?
         .into_iter()
         .filter_map(|(name, [x, y, sure])| Some(Column { name, place: [x?, y?], sure }))
         .collect();
@@ -88,11 +91,16 @@ pub fn read(
     if frames.is_empty() {
         return Err(RecordingError::Kind { kind: "CSV", reason: "it has no row below its header".into() });
     }
-    let mut found = found(Document::of_frames(frames), choices)?;
-    if let Some(remark) = found.remarks.first_mut() {
-        *remark = format!("{known} of {} named points are keypoints, seen from one side", points.len());
+    if frame.is_none() && ids.len() > bodies.len() {
+        let reason = format!(
+            "{} people have rows of their own, and no column numbers the frames: expected one of {}",
+            ids.len(),
+            FRAMES.join(", ")
+        );
+        return Err(RecordingError::Line { line: 1, reason });
     }
-    Ok(Some(found))
+    let about = format!("{known} of {} named points are keypoints", points.len());
+    found(Document::of_frames(frames), choices, Some(about)).map(Some)
 }
 
 fn cell(row: &StringRecord, column: usize) -> &str {
@@ -119,15 +127,22 @@ fn body<'a>(points: &'a [Column], prefix: &str) -> Body<'a> {
     known.filter_map(|(at, name)| Some((place(&name)?, *own.get(at)?))).collect()
 }
 
-/// Name of a point, and 0 for x, 1 for y, 2 for the confidence.
-fn field(column: &str) -> Option<(&str, usize)> {
+/// Name of a point, and the kind of its confidence.
+fn confidence(column: &str) -> Option<(&str, &'static str)> {
+    let (name, last) = column.rsplit_once(['_', ':', '.', ' '])?;
+    let kind = CONFIDENCES.into_iter().find(|known| last.eq_ignore_ascii_case(known))?;
+    Some((name, kind))
+}
+
+/// Name of a point, and 0 for x, 1 for y, 2 for the confidence of this kind.
+fn field<'a>(column: &'a str, kind: Option<&str>) -> Option<(&'a str, usize)> {
     let mocapnet = MOCAPNET.iter().enumerate().find_map(|(axis, start)| {
         let (begin, name) = column.split_at_checked(start.len())?;
         begin.eq_ignore_ascii_case(start).then_some((name, axis))
     });
     let sure = || {
-        let (name, last) = column.rsplit_once(['_', ':', '.', ' '])?;
-        CONFIDENCES.iter().any(|known| last.eq_ignore_ascii_case(known)).then_some((name, 2))
+        let (name, own) = confidence(column)?;
+        (Some(own) == kind).then_some((name, 2))
     };
     mocapnet.or_else(|| coordinate(column)).or_else(sure)
 }
@@ -192,6 +207,52 @@ mod tests {
         assert!(read(&text, Some(2)).is_ok() && read(&text, Some(3)).is_err());
         let error = read(&text.replacen(",82,50", ",82", 1), None).expect_err("a cell too few").to_string();
         assert!(error.starts_with("line 2") && error.contains("the header has"), "{error}");
+    }
+
+    #[test]
+    fn rows_of_several_people_need_a_column_of_frames_and_may_have_one_of_times() {
+        let header = cells(|name, _| format!("{name}_x,{name}_y"));
+        let row = |track: &str, frame: usize, x: f64| {
+            let place = cells(|_, [at, y]| format!("{},{y}", at + x));
+            format!("{track},{frame},{}{place}\n", 0.04 * frame as f64)
+        };
+        let rows = |track: &str, x: f64| (0..3).map(|frame| row(track, frame, x)).collect::<String>();
+        let rows = rows("ann", 0.0) + &rows("ben", 300.0);
+        for name in FRAMES {
+            let found = expect_person(&format!("track_id,{name},time{header}\n{rows}"), 3);
+            let remarks = found.remarks().join("; ");
+            assert!(found.rate_hz == 25.0 && remarks.contains("2 people"), "{} {remarks}", found.rate_hz);
+            assert!(!remarks.contains("frame rate"), "{remarks}");
+        }
+        let error = read(&format!("track_id,take,time{header}\n{rows}"), None).expect_err("no frames");
+        let error = error.to_string();
+        assert!(
+            error.starts_with("line 1") && error.contains("2 people") && error.contains("frame_idx"),
+            "{error}"
+        );
+        let found = expect_person(&format!("take,frame,clock{header}\n{}", row("a", 0, 0.0)), 1);
+        assert!(
+            found.remarks().join("; ").contains("the file states no frame rate"),
+            "{:?}",
+            found.remarks()
+        );
+    }
+
+    #[test]
+    fn one_kind_of_confidence_counts() {
+        let header = cells(|name, _| format!("{name}_x,{name}_y,{name}_visibility,{name}_score"));
+        let row = cells(|_, [x, y]| format!("{x},{y},1,0.01"));
+        expect_person(&format!("frame,instance.likelihood{header}\n0,0.5{row}\n"), 1);
+    }
+
+    #[test]
+    fn names_of_the_template_are_known() {
+        let header: String = NAMES.iter().map(|name| format!(",{name}_x,{name}_y")).collect();
+        let row: String = (0..NAMES.len()).map(|n| format!(",{},{}", 100 + n % 2, 30 + 5 * n)).collect();
+        let found = read(&format!("frame{header}\n0{row}\n"), None).expect("keypoints");
+        let remarks = found.remarks().join("; ");
+        assert!(remarks.contains("28 of 28 named points are keypoints, seen from one side"), "{remarks}");
+        assert!(found.by_name(0).contains_key("hip centre"));
     }
 
     #[test]

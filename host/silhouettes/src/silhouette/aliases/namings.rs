@@ -196,6 +196,7 @@ pub const NAMINGS: [Naming; 8] = [
             ("hip", "hip centre"),
             ("midhip", "hip centre"),
             ("chip", "hip centre"),
+            ("hipcentre", "hip centre"),
             ("pelvis", "hip centre"),
             ("@eye", "# eye"),
             ("#eye", "# eye"),

@@ -18,17 +18,22 @@ fn lists_of_numbers_with_the_length_of_a_layout_by_chance_are_refused() {
     let others: Vec<String> = (0..11).map(|n| format!(r#""lips{n}":[{}]"#, numbers(10))).collect();
     let json = format!(r#"{{"silhouette":[{}],{}}}"#, numbers(36), others.join(","));
     let error = read(json.as_bytes(), "json", Choices::default()).expect_err("points of a face").to_string();
-    assert!(error.contains("1 of its frames") && error.contains("11 other values"), "{error}");
+    assert!(error.contains("people's points in 1 frames, other values in 11"), "{error}");
 }
 
 #[test]
-fn frames_of_an_unknown_layout_are_reported() {
+fn entries_of_an_unknown_layout_are_reported() {
     let points = flat(&person(layout(17), 100.0));
-    let json = format!(r#"[{{"keypoints":{points}}},{{"keypoints":[1,2,3]}},{{"keypoints":[]}}]"#);
-    let found = upright(&json, 3);
-    assert!(
-        found.remarks().iter().any(|remark| remark.starts_with("1 frames hold")),
-        "{:?}",
-        found.remarks()
-    );
+    for json in [
+        format!(r#"[{{"keypoints":{points}}},{{"keypoints":[1,2,3]}},{{"keypoints":[]}}]"#),
+        format!(
+            r#"[{{"image_id":1,"keypoints":{points}}},{{"image_id":2,"keypoints":[1,2,3]}},{{"image_id":3,"keypoints":[]}}]"#
+        ),
+        format!(
+            r#"{{"1":{{"1":{{"keypoints":{points}}},"2":{{"keypoints":[1,2,3]}},"3":{{"keypoints":[]}}}}}}"#
+        ),
+    ] {
+        let remarks = upright(&json, 3).remarks().join("; ");
+        assert!(remarks.contains("in a known layout are taken as empty: 1 entries"), "{remarks}");
+    }
 }

@@ -53,15 +53,57 @@ fn expect_placed(json: &str, about: &str) -> super::super::super::recording::Rec
 
 #[test]
 fn points_are_placed_by_their_numbers() {
-    let from_zero =
-        expect_placed(&frames(&shown(), |n| format!(r#""id":{n}"#)), "up to 16, in the layout COCO");
+    let from_zero = expect_placed(
+        &frames(&shown(), |n| format!(r#""id":{n}"#)),
+        "from 0 up to 16, in the layout COCO (a guess)",
+    );
     let from_one = frames(&shown(), |n| format!(r#""id":"{}""#, n + 1));
-    assert_eq!(expect_placed(&from_one, "up to 17, in the layout COCO").frames, from_zero.frames);
+    assert_eq!(
+        expect_placed(&from_one, "from 1 up to 17, in the layout COCO (a guess)").frames,
+        from_zero.frames
+    );
     // Nobody has all points, and the ankles are never seen.
     let cut = frames(&[(0..15).collect(), (0..13).rev().collect()], |n| format!(r#""id":{n}"#));
     let found = read(cut.as_bytes(), "json", Choices::default()).expect("keypoints");
     assert_eq!(found.by_name(0)["left hip"], found.by_name(1)["left hip"]);
     assert!(found.remarks().iter().any(|remark| remark.contains("layout COCO")), "{:?}", found.remarks());
+}
+
+#[test]
+fn points_from_one_without_ears_are_those_of_coco() {
+    let order: Vec<usize> = (0..17).filter(|n| !(3..5).contains(n)).collect();
+    let found = upright(&frames(&[order.clone(), order], |n| format!(r#""id":{}"#, n + 1)), 2);
+    let remarks = found.remarks().join("; ");
+    assert!(remarks.contains("from 1 up to 17, in the layout COCO (a guess)"), "{remarks}");
+}
+
+#[test]
+fn numbers_up_to_no_layouts_last_one_are_refused() {
+    let refused = |count: usize| {
+        let point = |n: usize| format!(r#"{{"id":{n},"x":{},"y":{}}}"#, 10 * n, 7 * n);
+        let points: Vec<String> = (0..count).map(point).collect();
+        let json = format!(r#"[{{"keypoints":[{}]}}]"#, points.join(","));
+        read(json.as_bytes(), "json", Choices::default()).expect_err("no layout").to_string()
+    };
+    // BODY_25 without feet, and a hundred other things.
+    for count in [19, 100] {
+        let error = refused(count);
+        assert!(error.contains("too few of its named points (0, 1, 10"), "{error}");
+    }
+}
+
+#[test]
+fn numbers_that_run_through_the_file_leave_its_order() {
+    let points = person(layout(17), 100.0);
+    let frame = |frame: usize| {
+        let point =
+            |(n, [x, y, _]): (usize, &[f64; 3])| format!(r#"{{"id":{},"x":{x},"y":{y}}}"#, 17 * frame + n);
+        let points: Vec<String> = points.iter().enumerate().map(point).collect();
+        format!(r#"{{"keypoints":[{}]}}"#, points.join(","))
+    };
+    let found = upright(&format!("[{}]", (0..5).map(frame).collect::<Vec<_>>().join(",")), 5);
+    let remarks = found.remarks().join("; ");
+    assert!(remarks.contains("17 keypoints by their order in the layout COCO"), "{remarks}");
 }
 
 #[test]
@@ -81,27 +123,41 @@ fn named_points_of_mediapipe_have_the_depth_of_a_picture() {
                  mouth_left mouth_right left_shoulder right_shoulder left_elbow right_elbow left_wrist right_wrist \
                  left_pinky right_pinky left_index right_index left_thumb right_thumb left_hip right_hip left_knee \
                  right_knee left_ankle right_ankle left_heel right_heel left_foot_index right_foot_index";
-    let mut all: Vec<String> = names
-        .split_whitespace()
-        .zip(person(layout(33), 100.0))
-        .map(|(name, [x, y, _])| format!(r#"{{"x":{x},"y":{y},"z":-{x},"score":0.9,"name":"{name}"}}"#))
-        .collect();
-    assert_eq!(all.len(), 33);
-    all.reverse();
-    let found = upright(&format!(r#"[{{"keypoints":[{}]}}]"#, all.join(",")), 1);
-    assert!(found.by_name(0).contains_key("left big toe"));
+    let points = |shown: &dyn Fn(&str) -> bool| -> Vec<String> {
+        names
+            .split_whitespace()
+            .zip(person(layout(33), 100.0))
+            .filter(|(name, _)| shown(name))
+            .map(|(name, [x, y, _])| {
+                let (x, y) = (x / 640.0, y / 360.0);
+                format!(r#"{{"x":{x},"y":{y},"z":-{x},"score":0.9,"name":"{name}"}}"#)
+            })
+            .collect()
+    };
+    let all = points(&|_| true);
+    let without_ears = points(&|name| !name.ends_with("ear"));
+    assert_eq!((all.len(), without_ears.len()), (33, 31));
+    for mut shown in [all, without_ears] {
+        shown.reverse();
+        let found = upright(&format!(r#"[{{"keypoints":[{}]}}]"#, shown.join(",")), 1);
+        assert!(found.by_name(0).contains_key("left big toe"));
+    }
 }
 
 #[test]
 fn named_points_may_be_in_space() {
     let points = in_space(layout(17));
-    let of = |n: &usize| {
-        let ([x, y, z], name) = (points[*n], COCO[*n]);
-        format!(r#"{{"name":"{name}","x":{x},"y":{y},"z":{z}}}"#)
-    };
-    let order = [16, 0, 15, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14];
-    let json = order.iter().map(of).collect::<Vec<_>>().join(",");
-    upright_in_space(&format!(r#"[{{"keypoints":[{json}]}}]"#));
+    // On the ground with z up, and about the hips with y down.
+    let places: [fn([f64; 3]) -> [f64; 3]; 2] = [|point| point, |[x, y, z]| [x, 0.9 - z, y]];
+    for place in places {
+        let of = |n: &usize| {
+            let ([x, y, z], name) = (place(points[*n]), COCO[*n]);
+            format!(r#"{{"name":"{name}","x":{x},"y":{y},"z":{z}}}"#)
+        };
+        let order = [16, 0, 15, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14];
+        let json = order.iter().map(of).collect::<Vec<_>>().join(",");
+        upright_in_space(&format!(r#"[{{"keypoints":[{json}]}}]"#));
+    }
 }
 
 #[test]
