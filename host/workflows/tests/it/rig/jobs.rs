@@ -9,7 +9,6 @@ use farnear_workflows::{
     request::Request,
     rig::{
         AxisName, RigAddress, alarms, board,
-        lens_stack::RigStackRequest,
         log::{self, LogSettings},
         mechanics::{self, MechanicsFigures},
         motion::{self, MoveFigures, MoveRequest},
@@ -118,20 +117,4 @@ fn a_stop_and_a_halt_leave_the_link_rate_alone() {
     motion::halt(&rig, &context).unwrap();
     let board = board.board();
     assert_eq!((board.stops, board.halts, board.rate_requests), (1, 1, 0));
-}
-
-#[test]
-fn a_stack_of_more_slices_than_the_board_holds_is_refused_before_any_motion() {
-    let (port, board) = plug_in(Faults::default());
-    let folder = tempfile::tempdir().unwrap();
-    let request = RigStackRequest {
-        rig: RigAddress::Port(port),
-        camera: camera(folder.path()),
-        optics: optics(),
-        slices: 17,
-        out: folder.path().join("out"),
-    };
-    let error = request.run(&Context::unattended()).unwrap_err().to_string();
-    assert!(error.contains("holds 1 to 16 shots") && error.contains("has 17"), "{error}");
-    assert_eq!(board.board().acts, 0);
 }
