@@ -90,7 +90,7 @@ impl Frames {
         if let Some(usual) = self.usual.filter(|usual| *usual < COARSE) {
             let unchecked = if usual > TELLING { "" } else { ", and bad images are not recognised" };
             warnings.push(format!(
-                "neighbouring images have little in common (correlation {usual:.2}): the steps are wide, or the images are noisy or not aligned; \
+                "neighbouring images have little in common (correlation {usual:.2}): the steps are wide, or the images are noisy or not aligned (see --align); \
                  a missing image costs much accuracy{unchecked}"
             ));
         }
