@@ -1029,7 +1029,7 @@ class RigClient:
         wait_s: float = 30.0,
         light: Optional[tuple[float, float]] = None,
     ) -> list[tuple[NDArray[np.uint16], int, dict[str, object]]]:
-        """Runs a program of positions (axis, um) on the board; gives an image with its record for each."""
+        """Runs programs of positions (axis, um) on the board; gives an image with its record for each."""
     def capture_pair(
         self,
         camera: str,
