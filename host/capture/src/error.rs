@@ -19,7 +19,7 @@ pub enum PortError {
         present_ports(present)
     )]
     Nameless { present: Vec<String> },
-    #[error("there is no port {port}{}; {}", tcp_hint(port), present_ports(present))]
+    #[error("port {port} does not exist{}; {}", tcp_hint(port), present_ports(present))]
     Absent { port: String, present: Vec<String> },
     #[error(
         "the board has not come back as {port}; if it has another name now, start again with that one, or with one that stays: on \

@@ -43,7 +43,7 @@ static LEFT_S: AtomicU64 = AtomicU64::new(u64::MAX);
 /// Whether the cursor is behind a count that may be overwritten.
 static COUNTING_LINE: AtomicBool = AtomicBool::new(false);
 
-/// Writes to stderr. If it is closed, the work goes on without messages.
+/// Writes to stderr. If it is closed, the work continues without messages.
 pub fn say(text: &str) {
     let _ = std::io::stderr().write_all(text.as_bytes());
 }

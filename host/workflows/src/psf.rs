@@ -77,7 +77,7 @@ impl PsfSource {
             map::read(file)?
         } else {
             let mut image = image_file::read_grey(file)?;
-            // What is transparent in a drawing, NaN, is dark.
+            // Transparent pixels (NaN) of a drawing are dark.
             if image.samples != Samples::Float {
                 image.pixels.mapv_inplace(|value| value.max(0.0));
             }

@@ -9,7 +9,7 @@ use super::Optics;
 pub struct Doubt {
     what: &'static str,
     value: f64,
-    /// With the blank before it.
+    /// With a leading blank; empty for a ratio.
     unit: &'static str,
     usual: [f64; 2],
 }

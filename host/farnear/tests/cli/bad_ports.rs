@@ -27,7 +27,7 @@ fn capture_fails(port: &str, phrases: &[&str]) {
 
 #[test]
 fn an_absent_port_is_named_with_those_that_are_there() {
-    capture_fails("/dev/farnear-absent", &["there is no port /dev/farnear-absent", "present"]);
+    capture_fails("/dev/farnear-absent", &["port /dev/farnear-absent does not exist", "present"]);
     for job in [
         vec!["info"],
         vec!["home"],
@@ -39,13 +39,13 @@ fn an_absent_port_is_named_with_those_that_are_there() {
         vec!["log"],
     ] {
         let port = ["--port", "/dev/farnear-absent"];
-        fails(farnear(&["rig"]).args(job).args(port), 1, &["there is no port /dev/farnear-absent"]);
+        fails(farnear(&["rig"]).args(job).args(port), 1, &["port /dev/farnear-absent does not exist"]);
     }
 }
 
 #[test]
 fn the_environment_names_the_port_where_no_flag_does() {
-    let absent = |name: &str| format!("there is no port {name}");
+    let absent = |name: &str| format!("port {name} does not exist");
     let named = |args: &[&str]| {
         let mut command = farnear(args);
         command.env("FARNEAR_PORT", "/dev/farnear-absent");

@@ -199,10 +199,27 @@ impl Decoded {
             Values::U32(v) => (greys(v, pick, weights, even, 1.0), Samples::Integer(32)),
             Values::F32(v) => (greys(v, pick, weights, even, 1.0), Samples::Float),
         };
-        let pixels = Array2::from_shape_vec((self.height, self.width), values)
+        let mut pixels = Array2::from_shape_vec((self.height, self.width), values)
             .map_err(|_| "it has fewer pixels than its header says".to_string())?;
+        if let Some(transparent) = self.transparent() {
+            let hidden = pixels.iter_mut().zip(transparent).filter(|(_, transparent)| *transparent);
+            hidden.for_each(|(pixel, _)| *pixel = f32::NAN);
+        }
         let (colour, coding_variance) = (!self.is_grey(), self.coding_variance);
         Ok(GreyImage { pixels, samples, colour, white_level, coding_variance })
+    }
+
+    /// Where alpha is 0; `None` without alpha, or where it is 0 everywhere, as programs write an alpha that they do not use.
+    fn transparent(&self) -> Option<Vec<bool>> {
+        if !self.has_alpha() {
+            return None;
+        }
+        let transparent = match &self.values {
+            Values::U8(v) => last_are_zero(v, self.channels),
+            Values::U16(v) => last_are_zero(v, self.channels),
+            Values::U32(v) | Values::F32(v) => last_are_zero(v, self.channels),
+        };
+        transparent.contains(&false).then_some(transparent)
     }
 
     /// Whether red, green and blue are equal in every pixel, as in many grey pictures stored in colour.
@@ -297,6 +314,10 @@ fn last_of<T: Copy>(values: &[T], channels: usize) -> Vec<T> {
     values.chunks_exact(channels).map(|pixel| pixel[channels - 1]).collect()
 }
 
+fn last_are_zero<T: Copy + Default + PartialEq>(values: &[T], channels: usize) -> Vec<bool> {
+    values.chunks_exact(channels).map(|pixel| pixel[channels - 1] == T::default()).collect()
+}
+
 fn channels_are_equal<T: PartialEq>(values: &[T], channels: usize) -> bool {
     values.chunks_exact(channels).all(|pixel| pixel[0] == pixel[1] && pixel[1] == pixel[2])
 }
@@ -328,25 +349,7 @@ fn turn<T: Copy>(values: &mut Vec<T>, (height, width): (usize, usize), channels:
     *values = turned;
 }
 
-/// NaN where alpha is 0, unless it is 0 everywhere.
 fn greys<T: Copy + Into<f64>>(
-    samples: &[T],
-    (channels, colours): (usize, usize),
-    weights: [f64; 3],
-    even: bool,
-    full_scale: f64,
-) -> Vec<f32> {
-    let mut greys = greys_of_colours(samples, (channels, colours), weights, even, full_scale);
-    // Some programs leave an alpha that they do not use at 0.
-    let alphas = || samples.chunks_exact(channels).map(move |pixel| -> f64 { pixel[channels - 1].into() });
-    if channels > colours && alphas().any(|alpha| alpha != 0.0) {
-        let transparent = greys.iter_mut().zip(alphas()).filter(|(_, alpha)| *alpha == 0.0);
-        transparent.for_each(|(grey, _)| *grey = f32::NAN);
-    }
-    greys
-}
-
-fn greys_of_colours<T: Copy + Into<f64>>(
     samples: &[T],
     (channels, colours): (usize, usize),
     weights: [f64; 3],

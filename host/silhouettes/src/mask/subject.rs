@@ -146,7 +146,7 @@ impl SubjectChooser {
         })
     }
 
-    /// Median; `None` as long as it is unknown.
+    /// Median; `None` before the first [`KNOWN_AFTER`] areas.
     fn usual_area(&self) -> Option<usize> {
         let mut areas: Vec<usize> = self.areas.iter().copied().collect();
         areas.sort_unstable();

@@ -35,7 +35,7 @@ const HEAD: [usize; 6] = [0, 1, 2, 3, 4, 5];
 const ANKLES: [usize; 2] = [20, 21];
 const SHOULDERS: [usize; 2] = [8, 9];
 const HIPS: [usize; 2] = [16, 17];
-/// Entries with values that are no person's points, per frame with a person, in a file that holds something else.
+/// A file with more unread entries than this per frame with a person holds something else.
 const MOST_UNREAD: usize = 9;
 /// Coordinates up to this are shares of the picture's sides, not pixels; points may be outside, and few far outside.
 const NORMALISED: f64 = 3.0;

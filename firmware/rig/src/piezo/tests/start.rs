@@ -2,12 +2,18 @@
 
 use super::*;
 
-#[test]
-fn after_a_reset_it_ramps_down_from_its_position() {
+/// A stack that stands at this code.
+fn stretched(code: u16) -> Plant {
     let mut plant = Plant::new(NOMINAL, 5);
     for _ in 0..5_000 {
-        plant.tick(Some(51_000));
+        plant.tick(Some(code));
     }
+    plant
+}
+
+#[test]
+fn after_a_reset_it_ramps_down_from_its_position() {
+    let mut plant = stretched(51_000);
     let mut piezo = Piezo::new(Settings::DEFAULT.fine);
     // The converter does not answer immediately.
     piezo.sense(None);
@@ -56,10 +62,7 @@ fn a_piezo_whose_code_is_unknown_is_left_where_it_is() {
 
 #[test]
 fn a_move_after_a_start_waits_for_the_end_of_a_swing() {
-    let mut plant = Plant::new(NOMINAL, 5);
-    for _ in 0..5_000 {
-        plant.tick(Some(20_000));
-    }
+    let mut plant = stretched(20_000);
     // The power fails and returns: the DAC is at 0, and the stack swings.
     let mut piezo = Piezo::new(Settings::DEFAULT.fine);
     piezo.start_at(Some(0));

@@ -89,7 +89,7 @@ pub struct Document {
     pub size: Option<[f64; 2]>,
     /// Whether gaps in the numbers are too long to be filled.
     pub has_wide_gaps: bool,
-    /// Entries (frames, people of a picture or a track) with values that are no person's points.
+    /// Entries (frames, people of a picture or a track) whose values are not points of a person.
     pub unread: usize,
     /// A list, whose items may be frames, or people of one frame.
     is_list: bool,

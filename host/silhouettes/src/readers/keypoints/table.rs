@@ -198,7 +198,7 @@ mod tests {
         let row = |track: &str, frame: usize, x: f64| {
             format!("{track},{frame},0.9{}", cells(|_, [at, y]| format!("{},{y},0.9", at + x)))
         };
-        // Nobody is seen in frame 1; a score that is empty is that of a labelled point.
+        // Frame 1 is missing; the score of a labelled point is empty.
         let rows = [0, 2, 3].map(|frame| [row("ann", frame, 0.0), row("ben", frame, 300.0)].join("\n"));
         let text = format!("{header}\n{}\n", rows.join("\n")).replacen("0.9,118", ",118", 1);
         let ann = expect_person(&text, 4);

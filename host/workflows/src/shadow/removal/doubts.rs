@@ -16,7 +16,7 @@ const MUCH: f64 = 0.6;
 /// lack 0.14 and 5 % more than 0.5; with the opposite azimuth half lack 0.97 and 5 % less than 0.5. The unexplained share
 /// separates them less: it grows with the shadow.
 const MISSING: f64 = 0.5;
-/// Unexplained share that is no poor fit: of a small shadow most may be missing.
+/// Up to this unexplained share a fit is good: most of a small shadow may be missing.
 const EXPLAINED: f64 = 0.05;
 /// Below this, small errors change the long shadow's direction too much.
 const LOW_DEG: f64 = 8.0;

@@ -114,6 +114,6 @@ fn a_light_from_the_opposite_side_is_flagged_as_a_poor_fit() {
     };
     let (right, wrong) = (poor(Light::Sun), poor(opposite));
     assert!(right <= 1 && wrong >= 15, "{right} and {wrong} of {SCENES}");
-    // Without a fit there is no misfit.
+    // A direction needs no fit.
     assert_eq!(poor(|_| Light::Direction { eta_rad: 0.3 }), 0);
 }

@@ -62,7 +62,7 @@ fn points_are_placed_by_their_numbers() {
         expect_placed(&from_one, "from 1 up to 17, in the layout COCO (a guess)").frames,
         from_zero.frames
     );
-    // Nobody has all points, and the ankles are never seen.
+    // Both frames lack points, and the ankles are missing in both.
     let cut = frames(&[(0..15).collect(), (0..13).rev().collect()], |n| format!(r#""id":{n}"#));
     let found = read(cut.as_bytes(), "json", Choices::default()).expect("keypoints");
     assert_eq!(found.by_name(0)["left hip"], found.by_name(1)["left hip"]);
