@@ -385,8 +385,8 @@ class FocusStack:
         How clear and how well fitted the maximum of sharpness is, 0 to 1.
     all_in_focus : array float32
         Each pixel from the image in which it is sharpest: 0 to 1 for uint8 and uint16, else in the scale of the images.
-    moved_px : float
-        Farthest that alignment moved a pixel, px.
+    moved_px : float or None
+        Farthest that alignment moved a pixel, px; None without alignment.
     left_out : list of int
         Indices in `images` of those that were not used, see `findings`.
     findings : list of str
@@ -406,7 +406,7 @@ class FocusStack:
     def all_in_focus(self) -> NDArray[np.float32]:
         """-"""
     @property
-    def moved_px(self) -> float:
+    def moved_px(self) -> Optional[float]:
         """-"""
     @property
     def left_out(self) -> list[int]:

@@ -38,8 +38,8 @@ use crate::{
 ///     How clear and how well fitted the maximum of sharpness is, 0 to 1.
 /// all_in_focus : array float32
 ///     Each pixel from the image in which it is sharpest: 0 to 1 for uint8 and uint16, else in the scale of the images.
-/// moved_px : float
-///     Farthest that alignment moved a pixel, px.
+/// moved_px : float or None
+///     Farthest that alignment moved a pixel, px; None without alignment.
 /// left_out : list of int
 ///     Indices in `images` of those that were not used, see `findings`.
 /// findings : list of str
@@ -50,7 +50,7 @@ pub struct FocusStack {
     unit: &'static str,
     reliability: Py<PyArray2<f32>>,
     all_in_focus: Py<PyArray2<f32>>,
-    moved_px: f64,
+    moved_px: Option<f64>,
     left_out: Vec<usize>,
     findings: Vec<String>,
 }
@@ -61,7 +61,7 @@ type Parts<'py> = (
     &'static str,
     Bound<'py, PyArray2<f32>>,
     Bound<'py, PyArray2<f32>>,
-    f64,
+    Option<f64>,
     Vec<usize>,
     Vec<String>,
 );
@@ -90,7 +90,7 @@ impl FocusStack {
         unit: &str,
         reliability: Bound<'_, PyArray2<f32>>,
         all_in_focus: Bound<'_, PyArray2<f32>>,
-        moved_px: f64,
+        moved_px: Option<f64>,
         left_out: Vec<usize>,
         findings: Vec<String>,
     ) -> Self {

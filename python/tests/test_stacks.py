@@ -24,6 +24,7 @@ def images():
 def test_an_image_of_another_scene_is_left_out(images):
     good = farnear.focus_stack(images)
     assert good.left_out == [] and good.findings == []
+    assert good.moved_px is None and farnear.focus_stack(images, align="shift").moved_px < 0.5
     images[1] = blurred(3, seed=2)
     found = farnear.focus_stack(images, focused_at_mm=[300 + 10 * index for index in range(8)])
     assert found.left_out == [1]

@@ -107,6 +107,11 @@ pub trait Camera {
         false
     }
 
+    /// Whether a frame is assigned to its exposure by the frames before it, and not by a trigger number in it.
+    fn pairs_by_frames_before(&self) -> bool {
+        false
+    }
+
     /// Software trigger of one exposure.
     fn trigger(&mut self, trigger_number: u32, exposure: Micros) -> Result<(), CameraError>;
 

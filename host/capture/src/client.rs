@@ -81,7 +81,18 @@ impl Client {
     /// rate first, and keeps the board's.
     pub fn open_to_stop(port: &str) -> Result<Self, ClientError> {
         let (port, first) = with_rate(port)?;
-        Self::start_at(serial(port), port, false, (first, None))
+        Self::start_at(serial(port), port, false, (first, None), None)
+    }
+
+    /// As [`Client::open`] or [`Client::open_emulated`], interrupted by this flag ([`Client::interrupt_by`]) from the
+    /// beginning: once it is set, this returns [`ClientError::Interrupted`] and the port is closed.
+    pub fn open_interruptible(
+        port: &str,
+        emulated: bool,
+        interrupt: Arc<AtomicBool>,
+    ) -> Result<Self, ClientError> {
+        let (port, wanted) = with_rate(port)?;
+        Self::start_at(serial(port), port, emulated, (wanted, wanted), Some(interrupt))
     }
 
     /// As [`Client::open`] for an emulated board: hello has a long timeout, because a repeat would change the run.
@@ -105,7 +116,7 @@ impl Client {
         emulated: bool,
         wanted: Option<LinkRate>,
     ) -> Result<Self, ClientError> {
-        Self::start_at(connect, port, emulated, (wanted, wanted))
+        Self::start_at(connect, port, emulated, (wanted, wanted), None)
     }
 
     /// `rates`: of the first hello, and requested.
@@ -114,6 +125,7 @@ impl Client {
         port: &str,
         emulated: bool,
         rates: (Option<LinkRate>, Option<LinkRate>),
+        interrupt: Option<Arc<AtomicBool>>,
     ) -> Result<Self, ClientError> {
         let (inbox, commands) = channel();
         let timing = Arc::new(Mutex::new(Timing::REAL));
@@ -123,7 +135,7 @@ impl Client {
             }
             Arc::clone(&timing)
         };
-        let owner = Owner::start(connect, port, emulated, rates, choose, commands)?;
+        let owner = Owner::start(connect, port, emulated, rates, choose, commands, interrupt.clone())?;
         let session = owner.session();
         let thread = std::thread::spawn(move || owner.run());
         let port = Port {
@@ -134,7 +146,7 @@ impl Client {
             inbox: Some(inbox),
             thread: Some(thread),
         };
-        Ok(Self { port: Arc::new(port), session, interrupt: None, light: None, alternating: false })
+        Ok(Self { port: Arc::new(port), session, interrupt, light: None, alternating: false })
     }
 
     /// Light during each exposure of this handle's programs; the board rejects it for shots that it does not trigger.

@@ -16,7 +16,7 @@ use crate::{
     camera::{Camera, CameraError, Image},
     client::Client,
     error::ClientError,
-    expose::{CaptureError, check_exposures, one_trigger, wait_for_image},
+    expose::{CaptureError, check_exposures, expose_first, one_trigger, wait_for_image},
     work::{Step, Work},
 };
 
@@ -81,7 +81,8 @@ pub struct Continuous<'c> {
 }
 
 impl<'c> Continuous<'c> {
-    /// Arms camera and board and starts. Waits for each image at most `image_wait`.
+    /// Arms camera and board and starts. Waits for each image at most `image_wait`. A camera whose frames have no trigger
+    /// number takes one image before the run.
     pub fn start(
         client: &Client,
         camera: &'c mut dyn Camera,
@@ -93,6 +94,11 @@ impl<'c> Continuous<'c> {
         check_exposures(camera, shots)?;
         client.arm(shots)?;
         camera.arm(mode, exposure)?;
+        // The first frame of the run has a frame before it, too: losing it would shift all.
+        if let Some(first) = shots.first().filter(|_| camera.pairs_by_frames_before()) {
+            expose_first(client, camera, *first, image_wait)?;
+            client.arm(shots)?;
+        }
         let work = Some(client.start_continuous(shots, pace.period, pace.exposures)?);
         let client = client.clone();
         let reported = VecDeque::new();

@@ -41,10 +41,7 @@ pub enum PortError {
     Connect { port: String, reason: String },
     #[error("{port} is not a serial port; expected one such as /dev/ttyACM0, or tcp:HOST:PORT")]
     NoPort { port: String },
-    #[error(
-        "port {port} is busy: another program (a terminal, another farnear) or an attempt that was just cancelled holds it; end the program, or try \
-         again in some seconds"
-    )]
+    #[error("port {port} is busy: another program (a terminal, another farnear) holds it; end that program")]
     Busy { port: String },
     #[error(
         "no permission to open {port}; on Linux, add yourself to its group (often `dialout`) and log in again"

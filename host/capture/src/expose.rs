@@ -64,8 +64,8 @@ pub fn expose<E: From<CaptureError> + From<ClientError>>(
     expose_together(client, &mut [camera], shots, image_wait, |_, shot, image| on_image(shot, image))
 }
 
-/// As [`expose`] for any number of shots: one program after the other, each as long as the board can hold. `on_image`
-/// receives the index of the shot in `shots`.
+/// As [`expose`] for any number of shots: one program after the other, each as long as the board can hold. The cameras
+/// stay armed between them, so that a frame lost there is noticed. `on_image` receives the index of the shot in `shots`.
 pub fn expose_in_parts<E: From<CaptureError> + From<ClientError>>(
     client: &Client,
     camera: &mut dyn Camera,
@@ -73,19 +73,18 @@ pub fn expose_in_parts<E: From<CaptureError> + From<ClientError>>(
     image_wait: Duration,
     mut on_image: impl FnMut(usize, ShotRecord, Image) -> Result<(), E>,
 ) -> Result<(), E> {
-    one_trigger(shots)?;
-    check_exposures(camera, shots)?;
     let length = usize::from(client.hello().limits.shots_max.max(1));
-    for (part, shots) in shots.chunks(length).enumerate() {
-        expose(client, camera, shots, image_wait, |record, image| {
-            let (index, asked) = (usize::from(record.index), shots.len());
-            if index >= asked {
-                return Err(CaptureError::Count { reported: index + 1, asked }.into());
-            }
-            on_image(part * length + index, record, image)
-        })?;
-    }
-    Ok(())
+    with_armed(&mut [camera], shots, |cameras| {
+        shots.chunks(length).enumerate().try_for_each(|(part, shots)| {
+            run_armed(client, cameras, shots, image_wait, |_, record, image| {
+                let (index, asked) = (usize::from(record.index), shots.len());
+                if index >= asked {
+                    return Err(CaptureError::Count { reported: index + 1, asked }.into());
+                }
+                on_image(part * length + index, record, image)
+            })
+        })
+    })
 }
 
 /// As [`expose`] with several cameras on one trigger: `on_image` receives each image with its camera's index.
@@ -94,28 +93,72 @@ pub fn expose_together<E: From<CaptureError> + From<ClientError>>(
     cameras: &mut [&mut dyn Camera],
     shots: &[Shot],
     image_wait: Duration,
-    mut on_image: impl FnMut(usize, ShotRecord, Image) -> Result<(), E>,
+    on_image: impl FnMut(usize, ShotRecord, Image) -> Result<(), E>,
+) -> Result<(), E> {
+    with_armed(cameras, shots, |cameras| run_armed(client, cameras, shots, image_wait, on_image))
+}
+
+/// An exposure by an armed camera, whose count and time stamps later frames are compared with.
+pub(crate) fn expose_first(
+    client: &Client,
+    camera: &mut dyn Camera,
+    shot: Shot,
+    image_wait: Duration,
+) -> Result<(), CaptureError> {
+    let once = [Shot { repeat: 1, ..shot }];
+    run_armed(client, &mut [camera], &once, image_wait, |_, _, _| Ok(()))
+}
+
+fn of_camera(at: usize, count: usize) -> impl Fn(CameraError) -> CaptureError {
+    move |source| match count {
+        1 => CaptureError::Camera(source),
+        cameras => CaptureError::OneCamera { number: at + 1, cameras, source },
+    }
+}
+
+/// Arms the cameras for `work`.
+fn with_armed<E: From<CaptureError>>(
+    cameras: &mut [&mut dyn Camera],
+    shots: &[Shot],
+    work: impl FnOnce(&mut [&mut dyn Camera]) -> Result<(), E>,
 ) -> Result<(), E> {
     let (mode, exposure) = one_trigger(shots)?;
     for camera in cameras.iter_mut() {
         check_exposures(&mut **camera, shots)?;
     }
     let count = cameras.len();
-    let of = |at: usize| {
-        move |source: CameraError| match count {
-            1 => CaptureError::Camera(source),
-            cameras => CaptureError::OneCamera { number: at + 1, cameras, source },
-        }
-    };
     for (at, camera) in cameras.iter_mut().enumerate() {
-        camera.arm(mode, exposure).map_err(of(at))?;
+        camera.arm(mode, exposure).map_err(of_camera(at, count))?;
     }
+    let run = work(cameras);
+    if mode != TriggerMode::FreeRunning {
+        return run;
+    }
+    // Re-enables the cameras' trigger lines in any case.
+    let disarm = |(at, camera): (usize, &mut &mut dyn Camera)| {
+        camera.arm(TriggerMode::Hardware, exposure).map_err(of_camera(at, count))
+    };
+    let disarmed = cameras.iter_mut().enumerate().try_for_each(disarm);
+    run?;
+    disarmed?;
+    Ok(())
+}
+
+/// Runs one program with armed cameras.
+fn run_armed<E: From<CaptureError> + From<ClientError>>(
+    client: &Client,
+    cameras: &mut [&mut dyn Camera],
+    shots: &[Shot],
+    image_wait: Duration,
+    mut on_image: impl FnMut(usize, ShotRecord, Image) -> Result<(), E>,
+) -> Result<(), E> {
+    let count = cameras.len();
     let mut reported = 0;
-    let run = run_program(client, shots, |kind, received| -> Result<(), E> {
+    run_program(client, shots, |kind, received| -> Result<(), E> {
         match kind {
             EventKind::ShotReady { trigger_number, exposure, .. } => {
                 for (at, camera) in cameras.iter_mut().enumerate() {
-                    camera.trigger(*trigger_number, *exposure).map_err(of(at))?;
+                    camera.trigger(*trigger_number, *exposure).map_err(of_camera(at, count))?;
                 }
             }
             EventKind::ShotDone { shot, .. } => {
@@ -124,7 +167,7 @@ pub fn expose_together<E: From<CaptureError> + From<ClientError>>(
                     camera.reported(shot, received);
                     let image = wait_for_image(client, &mut **camera, shot, image_wait);
                     let image = image.map_err(|error| match error {
-                        CaptureError::Camera(source) => of(at)(source),
+                        CaptureError::Camera(source) => of_camera(at, count)(source),
                         other => other,
                     })?;
                     on_image(at, *shot, image)?;
@@ -133,25 +176,14 @@ pub fn expose_together<E: From<CaptureError> + From<ClientError>>(
             _ => {}
         }
         Ok(())
-    });
-    if mode == TriggerMode::FreeRunning {
-        // Re-enables the cameras' trigger lines in any case.
-        let disarm = |(at, camera): (usize, &mut &mut dyn Camera)| {
-            camera.arm(TriggerMode::Hardware, exposure).map_err(of(at))
-        };
-        let disarmed = cameras.iter_mut().enumerate().try_for_each(disarm);
-        run?;
-        disarmed?;
-    } else {
-        run?;
-    }
+    })?;
     let asked = shots.iter().map(|shot| usize::from(shot.repeat)).sum();
     if reported != asked {
         return Err(CaptureError::Count { reported, asked }.into());
     }
     for (at, camera) in cameras.iter_mut().enumerate() {
         expect_no_more(client, &mut **camera).map_err(|error| match error {
-            CaptureError::Camera(source) => of(at)(source),
+            CaptureError::Camera(source) => of_camera(at, count)(source),
             other => other,
         })?;
     }

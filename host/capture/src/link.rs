@@ -2,7 +2,10 @@
 
 use std::{
     io::{self, ErrorKind},
-    sync::Arc,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
     time::{Duration, Instant},
 };
 
@@ -19,6 +22,8 @@ const QUIET: Duration = Duration::from_millis(5);
 /// Longest wait for silence.
 const QUIET_AT_MOST: Duration = Duration::from_millis(500);
 const SEND_AT_LEAST: Duration = Duration::from_millis(20);
+/// Longest read between two looks at the interruption.
+const SLICE: Duration = Duration::from_millis(25);
 
 /// Drops input until the line is silent, or the timeout.
 fn until_quiet(transport: &mut dyn Transport, buffer: &mut [u8]) -> io::Result<()> {
@@ -51,6 +56,7 @@ pub(crate) struct Link {
     next_id: u32,
     bytes: u64,
     bad_frames: u64,
+    interrupt: Option<Arc<AtomicBool>>,
 }
 
 impl Link {
@@ -66,7 +72,13 @@ impl Link {
             next_id: 1,
             bytes: 0,
             bad_frames: 0,
+            interrupt: None,
         }
+    }
+
+    /// Once this flag is set, reads return [`ClientError::Interrupted`].
+    pub(crate) fn interrupt_by(&mut self, flag: Option<Arc<AtomicBool>>) {
+        self.interrupt = flag;
     }
 
     /// Starts a session; ids follow the last one seen by the board.
@@ -231,8 +243,15 @@ impl Link {
                 return Ok(None);
             }
             looked = true;
+            let slice = match &self.interrupt {
+                Some(flag) if flag.load(Ordering::Relaxed) => {
+                    return Err(ClientError::Interrupted { during: during.into(), stopped: false });
+                }
+                Some(_) => left.min(SLICE),
+                None => left,
+            };
             let received = match &mut self.transport {
-                Some(transport) => transport.receive(&mut self.buffer, left),
+                Some(transport) => transport.receive(&mut self.buffer, slice),
                 None => Err(ErrorKind::NotConnected.into()),
             };
             match received {

@@ -22,24 +22,34 @@ const SATURATED: f64 = 0.98;
 const STEP_MAX: f64 = 8.0;
 const EXPOSURES_MAX: usize = 8;
 
-/// Finds the brightest unsaturated exposure, by up to 8 of `shot`; returns the nearest time within the limits of board and
-/// camera.
+/// Finds the brightest unsaturated exposure within the limits of board and camera, by up to 8 of `shot`. Returns the best of
+/// their times, and the brightness of its brightest pixels as a share of white.
 pub fn exposure(
     client: &Client,
     camera: &mut dyn Camera,
     shot: Shot,
     image_wait: Duration,
-) -> Result<Micros, CaptureError> {
+) -> Result<(Micros, f64), CaptureError> {
     let limits = &client.hello().limits;
     let own = if camera.sets_exposure(shot.mode) { camera.controls()? } else { Vec::new() };
     let (min, max) = within((limits.exposure_min, limits.exposure_max), &own);
     let mut shot = Shot { exposure: shot.exposure.clamp(min, max), ..shot };
+    let (mut best, mut least_off) = ((shot.exposure, 0.0), f64::INFINITY);
     for _ in 0..EXPOSURES_MAX {
         let mut brightness = 0.0;
         expose(client, camera, &[shot], image_wait, |_, image| -> Result<(), CaptureError> {
             brightness = brightest(&image);
             Ok(())
         })?;
+        // Among saturated images the shortest exposure is the best.
+        let off = if brightness > SATURATED {
+            1.0 + f64::from(shot.exposure.0)
+        } else {
+            (brightness - TARGET).abs()
+        };
+        if off < least_off {
+            (best, least_off) = ((shot.exposure, brightness), off);
+        }
         if GOOD.contains(&brightness) {
             break;
         }
@@ -52,7 +62,7 @@ pub fn exposure(
         }
         shot.exposure = next;
     }
-    Ok(shot.exposure)
+    Ok(best)
 }
 
 /// Limits of the board within the camera's range, if it states one.

@@ -9,6 +9,7 @@ use std::{
     collections::BTreeMap,
     sync::{
         Arc, Mutex, PoisonError, Weak,
+        atomic::AtomicBool,
         mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender},
     },
     time::{Duration, Instant},
@@ -114,8 +115,10 @@ impl Owner {
         (first, wanted): (Option<LinkRate>, Option<LinkRate>),
         timing: impl FnOnce(&Hello) -> Arc<Mutex<Timing>>,
         inbox: Receiver<Command>,
+        interrupt: Option<Arc<AtomicBool>>,
     ) -> Result<Self, ClientError> {
         let mut link = Link::new(connect()?, port);
+        link.interrupt_by(interrupt);
         // An earlier host may have set this rate.
         link.set_rate(first.unwrap_or(LinkRate::START), "opening the port")?;
         let (hello, version) = shake_hands(&mut link, emulated)?;
@@ -153,6 +156,7 @@ impl Owner {
             unanswered: 0,
         };
         owner.join_events()?;
+        owner.link.interrupt_by(None); // from now on an interruption stops the rig over this link
         Ok(owner)
     }
 

@@ -125,8 +125,12 @@ pub fn capture_pair(
 ) -> Result<Pair, CaptureError> {
     let mut reach = reach(client, sensor, exposures, say)?;
     if exposures.auto {
-        let found = meter::exposure(client, camera, reach.shots[0], exposures.image_wait)?;
-        say(&format!("exposure time {} us", found.0));
+        let (found, share) = meter::exposure(client, camera, reach.shots[0], exposures.image_wait)?;
+        say(&format!(
+            "exposure time {} us: the brightest pixels have {:.0} % of white",
+            found.0,
+            100.0 * share
+        ));
         reach.shots.iter_mut().for_each(|shot| shot.exposure = found);
     }
     let [far, near] = reach.shots.map(|shot| um(shot.target));

@@ -24,7 +24,10 @@ pub enum PlanError {
         um(asked.0), um(min.0), um(max.0)
     )]
     Position { axis: &'static str, asked: Nanometres, min: Nanometres, max: Nanometres },
-    #[error("the board holds 1 to {max} shots at a time, the program has {asked}")]
+    #[error(
+        "a continuous run repeats a cycle of 1 to {max} shots, which the board holds, this one has {asked}; shorten it, or take it \
+         without a rate by `farnear rig sequence --runs`"
+    )]
     Shots { asked: usize, max: u8 },
     #[error(
         "the optics ask for {travel_um:.2} um between the two images, the piezo has {piezo_um:.2} um; \

@@ -10,8 +10,10 @@ const BLOCKS: usize = 6;
 /// Least deviation from 1 of a factor that counts, and in multiples of its median deviation among the blocks.
 const LEAST: f64 = 0.01;
 const SIGNIFICANT: f64 = 3.0;
-/// A darker frame would have its noise amplified.
-const LARGEST: f64 = 2.0;
+/// Largest deviation that counts, as part of the factor: the blocks must agree to a sixth, however large it is.
+const COUNTED: f64 = 0.5;
+/// Least factor: evened out, a darker frame would cost more by its noise than its absence does.
+const DARKEST: f64 = 0.1;
 
 /// Rows and columns of the 6x6 blocks of an image of (height, width).
 pub fn blocks((height, width): (usize, usize)) -> impl Iterator<Item = [Range<usize>; 2]> {
@@ -30,7 +32,7 @@ pub fn of_blocks(image: ArrayView2<f32>) -> Vec<f64> {
 }
 
 /// Brightness of each frame, from its blocks ([`of_blocks`]), relative to the usual one of the `members`; 1 where its blocks
-/// do not agree on another from 0.5 to 2.
+/// do not agree on another of at least 0.1.
 pub fn gains(frames: &[Vec<f64>], members: &[usize]) -> Vec<f64> {
     let usual: Vec<f64> = (0..BLOCKS * BLOCKS)
         .map(|block| median(members.iter().map(|frame| frames[*frame][block]).collect()))
@@ -44,9 +46,8 @@ pub fn gains(frames: &[Vec<f64>], members: &[usize]) -> Vec<f64> {
             .collect();
         let gain = median(ratios.clone());
         let spread = median(ratios.iter().map(|ratio| (ratio - gain).abs()).collect());
-        let counts = (gain - 1.0).abs() > LEAST.max(SIGNIFICANT * spread);
-        let small = (LARGEST.recip()..=LARGEST).contains(&gain);
-        if counts && small { gain } else { 1.0 }
+        let counts = (gain - 1.0).abs().min(COUNTED * gain) > LEAST.max(SIGNIFICANT * spread);
+        if counts && gain >= DARKEST { gain } else { 1.0 }
     };
     frames.iter().map(gain).collect()
 }
@@ -91,9 +92,10 @@ mod tests {
 
     #[test]
     fn a_factor_of_the_whole_frame_is_found() {
-        let found = gains_of(&[1.0, 1.3, 1.0, 0.8, 1.0], 0.0);
-        for (found, expected) in found.iter().zip([1.0, 1.3, 1.0, 0.8, 1.0]) {
-            assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+        for factors in [[1.0, 1.3, 1.0, 0.8, 1.0], [1.0, 0.2, 1.0, 5.0, 2.2], [0.2, 0.5, 1.0, 2.5, 6.0]] {
+            for (found, expected) in gains_of(&factors, 0.0).iter().zip(factors) {
+                assert!((found - expected).abs() < 1e-5, "{found} {expected}");
+            }
         }
     }
 
@@ -102,6 +104,8 @@ mod tests {
     fn other_changes_are_of_the_scene() {
         assert_eq!(gains_of(&[1.0, 1.05, 1.0, 1.1, 1.0], 0.3), [1.0; 5]);
         assert_eq!(gains_of(&[1.0, 1.005, 1.0, 0.995, 1.0], 0.0), [1.0; 5]);
-        assert_eq!(gains_of(&[1.0, 0.1, 1.0, 3.0, 1.0], 0.0), [1.0; 5]);
+        assert_eq!(gains_of(&[1.0, 1.0, 1.0, 1.0, 3.0], 0.3), [1.0; 5]);
+        assert_eq!(gains_of(&[1.0, 1.0, 1.0, 1.0, 0.2], 0.3), [1.0; 5]);
+        assert_eq!(gains_of(&[1.0, 0.05, 1.0, 0.0, 1.0], 0.0), [1.0; 5]);
     }
 }

@@ -12,7 +12,7 @@ use farnear_silhouettes::readers::READERS;
 use farnear_workflows::{
     WorkflowError,
     activity::{recognition::MODEL_FILE, samples::SamplesError, shipped},
-    correction_file, operators,
+    correction_file, operators, optics,
     shadow::removal::CAMERA_FILE,
     silhouettes::SilhouettesError,
     simulator::SimulatorError,
@@ -32,6 +32,12 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::About { source, .. } => of_workflow(source),
         WorkflowError::Read { what: operators::KIND, .. } => {
             Some("operators have a name such as gro:linear, or `farnear operators --out` saves them".into())
+        }
+        WorkflowError::Read { what: optics::KIND, source, .. }
+            if matches!(source.kind(), ErrorKind::InvalidData | ErrorKind::IsADirectory) =>
+        {
+            let command = "farnear optics --distance-mm 300 --range-mm 40 --out optics.toml";
+            Some(format!("expected a TOML file, as `{command}` writes it"))
         }
         WorkflowError::File { expected: operators::KIND, .. } => {
             Some("`farnear operators --out` saves some".into())

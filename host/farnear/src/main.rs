@@ -15,7 +15,10 @@ mod scene;
 mod terminal;
 mod tips;
 
-use std::process::ExitCode;
+use std::{
+    io::{self, Write},
+    process::ExitCode,
+};
 
 use clap::{
     CommandFactory, Parser, Subcommand,
@@ -107,7 +110,26 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let result = match parse().command {
+    let result = parse().and_then(|command| command.map_or(Ok(()), execute));
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        // Not returned from main: RUST_BACKTRACE would add a backtrace to the message.
+        Err(error) => {
+            terminal::end_count();
+            if report::is_closed(&error) {
+                return ExitCode::from(report::CLOSED);
+            }
+            let hint = hints::hint(&error).map(|hint| format!("; {hint}")).unwrap_or_default();
+            terminal::say(&format!("farnear: {}{hint}\n", message(&error)));
+            let usage =
+                error.is::<report::Usage>() || error.downcast_ref().is_some_and(WorkflowError::is_usage);
+            if usage { ExitCode::from(2) } else { ExitCode::FAILURE }
+        }
+    }
+}
+
+fn execute(command: Command) -> anyhow::Result<()> {
+    match command {
         Command::Optics(task) => task.run(),
         Command::Operators(task) => task.run(),
         Command::Depth(task) => task.run(),
@@ -130,34 +152,25 @@ fn main() -> ExitCode {
         Command::Doctor(arguments) => commands::doctor::run(arguments),
         Command::Completions(arguments) => commands::completions::run::<Arguments>(arguments),
         Command::Man(arguments) => commands::man::run::<Arguments>(&arguments),
-    };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        // Not returned from main: RUST_BACKTRACE would add a backtrace to the message.
-        Err(error) => {
-            terminal::end_count();
-            if report::is_closed(&error) {
-                return ExitCode::from(report::CLOSED);
-            }
-            let hint = hints::hint(&error).map(|hint| format!("; {hint}")).unwrap_or_default();
-            terminal::say(&format!("farnear: {}{hint}\n", message(&error)));
-            let usage =
-                error.is::<report::Usage>() || error.downcast_ref().is_some_and(WorkflowError::is_usage);
-            if usage { ExitCode::from(2) } else { ExitCode::FAILURE }
-        }
     }
 }
 
-/// Parses the command line; some errors get a tip.
-fn parse() -> Arguments {
-    Arguments::try_parse().unwrap_or_else(|mut error| {
-        let words: Vec<String> =
-            std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()).collect();
-        if let Some(tip) = tips::tip(&error, &Arguments::command(), &words) {
-            error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
-        }
-        error.exit()
-    })
+/// Parses the command line; some errors get a tip. `None` if it asks for help or the version, which is printed.
+fn parse() -> anyhow::Result<Option<Command>> {
+    let mut error = match Arguments::try_parse() {
+        Ok(arguments) => return Ok(Some(arguments.command)),
+        Err(error) => error,
+    };
+    if !error.use_stderr() {
+        report::written(error.print().and_then(|()| io::stdout().flush()))?;
+        return Ok(None);
+    }
+    let words: Vec<String> =
+        std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()).collect();
+    if let Some(tip) = tips::tip(&error, &Arguments::command(), &words) {
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
+    }
+    error.exit()
 }
 
 /// An error and its causes in one line, without causes that the error's message already contains.

@@ -51,8 +51,12 @@ pub fn print<T: Serialize>(figures: &T, json: bool) -> Result<()> {
 /// Returns an error, without a panic, for a closed pipe or a full disk.
 pub fn to_stdout(text: &str) -> io::Result<()> {
     let mut stdout = io::stdout().lock();
-    let written = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush());
-    written.map_err(|error| match error.kind() {
+    written(stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()))
+}
+
+/// The result of writing to stdout, with an error that names it.
+pub fn written(result: io::Result<()>) -> io::Result<()> {
+    result.map_err(|error| match error.kind() {
         ErrorKind::BrokenPipe => io::Error::new(ErrorKind::BrokenPipe, Closed),
         kind => io::Error::new(kind, format!("cannot write to the standard output: {error}")),
     })

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use clap::{
-    Command, Error,
+    Arg, Command, Error,
     error::{ContextKind, ContextValue, ErrorKind},
 };
 use farnear_files::video::pictures::EXTENSIONS;
@@ -24,7 +24,8 @@ pub fn tip(error: &Error, program: &Command, words: &[String]) -> Option<String>
     };
     match error.kind() {
         ErrorKind::UnknownArgument => without_equals(command, words)
-            .or_else(|| one_of_several(command, invalid(ContextKind::InvalidArg)?)),
+            .or_else(|| one_of_several(command, invalid(ContextKind::InvalidArg)?))
+            .or_else(|| without_option(command, invalid(ContextKind::InvalidArg)?)),
         ErrorKind::InvalidSubcommand if error.get(ContextKind::SuggestedSubcommand).is_none() => {
             match name == program.get_name() {
                 true => elsewhere(program, invalid(ContextKind::InvalidSubcommand)?),
@@ -57,6 +58,18 @@ fn one_of_several(command: &Command, word: &str) -> Option<String> {
     let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     (takes_a_folder && EXTENSIONS.contains(&ending.as_str()))
         .then(|| format!("give the folder of the pictures: {}", folder.display()))
+}
+
+/// For a file, and a command that takes files by options only.
+fn without_option(command: &Command, word: &str) -> Option<String> {
+    let is_file = !word.starts_with('-') && Path::new(word).extension().is_some();
+    let is_input = |option: &&Arg| {
+        let values = option.get_value_names().unwrap_or_default();
+        option.get_long() != Some("out") && values.iter().any(|name| name.as_str() == "FILE")
+    };
+    let option = command.get_arguments().find(is_input)?.get_long()?;
+    let only_by_option = is_file && command.get_positionals().next().is_none();
+    only_by_option.then(|| format!("a file is given by an option: --{option} {word}"))
 }
 
 /// For a word that is the name, or a part of the name, of commands anywhere in the program.

@@ -3,6 +3,7 @@
 //! contradict.
 
 pub(crate) mod name;
+mod reading;
 
 use std::{
     cmp::Ordering,
@@ -11,12 +12,18 @@ use std::{
 };
 
 use crate::image_file::metadata::taken;
-use name::{Name, Number, last_varying};
+use name::{Name, last_varying};
+use reading::read;
+
+pub use reading::{ambiguity, same_number};
 
 pub fn sort(paths: &mut [PathBuf]) {
     paths.sort_by(|a, b| natural(&stem(a), &stem(b)));
-    if let Some(values) = values(paths) {
-        paths.sort_by(|a, b| values.order(a, b));
+    let (names, values) = read(paths);
+    if let Some(values) = values {
+        let mut named: Vec<(Name, PathBuf)> = names.into_iter().zip(paths.iter().cloned()).collect();
+        named.sort_by(|(a, _), (b, _)| values.order(a, b));
+        paths.iter_mut().zip(named).for_each(|(path, (_, sorted))| *path = sorted);
         return;
     }
     if let Some(first) = roll_over(paths) {
@@ -26,7 +33,7 @@ pub fn sort(paths: &mut [PathBuf]) {
 
 /// Neighbours of a sorted list between which the counter restarted.
 pub fn counter_started_again(sorted: &[PathBuf]) -> Option<[&PathBuf; 2]> {
-    if values(sorted).is_some() {
+    if read(sorted).1.is_some() {
         return None;
     }
     sorted.windows(2).find_map(|two| {
@@ -39,7 +46,7 @@ pub fn counter_started_again(sorted: &[PathBuf]) -> Option<[&PathBuf; 2]> {
 /// Neighbours of a sorted list between which a number is missing, where most numbers are evenly apart. A counter that starts
 /// again leaves none.
 pub fn gap(sorted: &[PathBuf]) -> Option<[&PathBuf; 2]> {
-    let names: Vec<Name> = sorted.iter().map(|path| Name::of(path)).collect();
+    let (names, _) = read(sorted);
     let column = last_varying(&names)?;
     let numbers: Vec<f64> = names.iter().map(|name| name.numbers[column].value()).collect::<Option<_>>()?;
     let steps: Vec<f64> = numbers.windows(2).map(|two| (two[1] - two[0]).abs()).collect();
@@ -56,7 +63,7 @@ pub fn gap(sorted: &[PathBuf]) -> Option<[&PathBuf; 2]> {
 
 /// The numbers that count files: the last that varies between names of one pattern, else the last of each name.
 pub fn numbers(paths: &[PathBuf]) -> Vec<Option<f64>> {
-    let names: Vec<Name> = paths.iter().map(|path| Name::of(path)).collect();
+    let (names, _) = read(paths);
     let column = last_varying(&names);
     let number = |name: &Name| match column {
         Some(column) => name.numbers[column].value(),
@@ -74,8 +81,13 @@ pub fn same_stem(paths: &[PathBuf]) -> Option<[PathBuf; 2]> {
     paths.iter().find_map(|path| stems.insert(stem(path), path).map(|other| [other.clone(), path.clone()]))
 }
 
+/// A name without its ending, with full-width digits as ASCII.
 pub(crate) fn stem(path: &Path) -> String {
-    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+    let ascii = |c: char| {
+        let value = u32::from(c).checked_sub(u32::from('\u{ff10}'));
+        value.and_then(|value| char::from_digit(value, 10)).unwrap_or(c)
+    };
+    path.file_stem().unwrap_or_default().to_string_lossy().chars().map(ascii).collect()
 }
 
 /// Last number of a name, with the surrounding text and digit count.
@@ -87,46 +99,6 @@ fn number(path: &Path) -> Option<(u64, (String, usize, String))> {
     let begin = (begin..end).find(|at| stem.is_char_boundary(*at))?;
     let digits = &stem[begin..end];
     Some((digits.parse().ok()?, (stem[..begin].into(), digits.len(), stem[end..].into())))
-}
-
-/// How to compare names of one pattern whose last varying number has decimals or signs.
-struct Values {
-    column: usize,
-    signed: bool,
-}
-
-fn values(paths: &[PathBuf]) -> Option<Values> {
-    let names: Vec<Name> = paths.iter().map(|path| Name::of(path)).collect();
-    let column = last_varying(&names)?;
-    let numbers: Vec<&Number> = names.iter().map(|name| &name.numbers[column]).collect();
-    let minus = |number: &&Number| number.sign == Some('-');
-    // With all names, a minus separates: `a-1`, `a-2`.
-    let signed = numbers.iter().any(minus) && !numbers.iter().all(minus);
-    (signed || decimals(&numbers)).then_some(Values { column, signed })
-}
-
-/// Whether the numbers are decimals, not `1.9` and `1.10` of a numbering by sections.
-fn decimals(numbers: &[&Number]) -> bool {
-    let lengths = || numbers.iter().map(|number| number.fraction().map_or(0, str::len));
-    let one_length = lengths().min() == lengths().max();
-    // Programs print decimals of several lengths without trailing zeros, apart from `1.0`.
-    let shortest = |number: &&Number| number.fraction().is_none_or(|f| f.len() == 1 || !f.ends_with('0'));
-    let exponents = numbers.iter().any(|number| number.has_exponent());
-    exponents || lengths().any(|length| length > 0) && (one_length || numbers.iter().all(shortest))
-}
-
-impl Values {
-    fn order(&self, a: &Path, b: &Path) -> Ordering {
-        let (a, b) = (Name::of(a), Name::of(b));
-        let before = a.numbers.iter().zip(&b.numbers).take(self.column);
-        let before = before.map(|(a, b)| natural(&a.text, &b.text)).find(|order| order.is_ne());
-        let value = |name: &Name| {
-            let Number { sign, text } = &name.numbers[self.column];
-            let magnitude: f64 = text.parse().unwrap_or(f64::INFINITY);
-            if self.signed && *sign == Some('-') { -magnitude } else { magnitude }
-        };
-        before.unwrap_or_else(|| value(&a).partial_cmp(&value(&b)).unwrap_or(Ordering::Equal))
-    }
 }
 
 /// Start of the order after a counter restart, if any.
@@ -274,6 +246,13 @@ mod tests {
             let paths: Vec<PathBuf> = names.iter().map(PathBuf::from).collect();
             assert_eq!(counter_started_again(&paths), None);
         }
+    }
+
+    #[test]
+    fn full_width_digits_are_digits() {
+        let names = ["z\u{ff11}.png", "z\u{ff12}.png", "z\u{ff11}\u{ff10}.png"];
+        assert_eq!(sorted(&[names[2], names[1], names[0]]), names);
+        assert_eq!(numbers(&names.map(PathBuf::from)), [Some(1.0), Some(2.0), Some(10.0)]);
     }
 
     #[test]

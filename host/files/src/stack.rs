@@ -40,6 +40,8 @@ pub enum StackError {
     Missing { path: PathBuf },
     #[error("{} holds {found}: the images of a stack have one format; move the others away", path.display())]
     Mixed { path: PathBuf, found: String },
+    #[error("{} and {} have the same number: move one of them away, or rename it", first.display(), second.display())]
+    SameNumber { first: PathBuf, second: PathBuf },
     #[error("{} and {} hold the same image; move one of them away", first.display(), second.display())]
     Twice { first: PathBuf, second: PathBuf },
     #[error("{}: {reason}", path.display())]

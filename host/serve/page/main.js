@@ -107,13 +107,13 @@ function asking() {
 const [askForControl, askForJob] = [asking(), asking()];
 
 /** Questions to the browser that has control. */
-function showQuestions({ control: { requested_by: to }, question }) {
+function showQuestions({ control: { requested_by: to }, question, questions: number }) {
   const mine = hasControl();
   askForControl(mine ? to : null, "Another browser asks for control.", { yes: "Hand over", no: "Keep" },
     (answer) => act("/api/control/answer", { to, give: answer !== null }));
-  askForJob(mine ? question : null, question, { text: true, yes: "Answer", no: "Give up" }, (answer) => {
+  askForJob(mine && question !== null ? number : null, question, { text: true, yes: "Answer", no: "Give up" }, (answer) => {
     if (answer !== null) act("/api/answer", { text: answer });
-    else if (store.state?.question === question) stop();
+    else if (store.state?.question != null && store.state.questions === number) stop();
   });
 }
 

@@ -38,6 +38,7 @@ export interface State {
   };
   control: { holder: number | null; requested_by: number | null; clients: number };
   question: string | null;
+  questions: number;
   captures: number;
   optics: number;
   log: number;

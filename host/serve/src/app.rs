@@ -417,6 +417,7 @@ fn beginning(address: Option<&RigAddress>, camera: &CameraSettings, live: &Live)
         },
         control: ControlState { holder: None, requested_by: None, clients: 0 },
         question: None,
+        questions: 0,
         captures: 0,
         optics: 0,
         log: 0,

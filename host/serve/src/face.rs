@@ -63,7 +63,10 @@ impl Progress for Face<'_> {
 impl Questions for Face<'_> {
     fn ask(&self, question: &str, cancel: &Cancel) -> Result<String, WorkflowError> {
         *lock(&self.app.answer) = None;
-        self.app.change(|state| state.question = Some(question.trim().into()));
+        self.app.change(|state| {
+            state.question = Some(question.trim().into());
+            state.questions += 1;
+        });
         let answered = self.answer(cancel);
         // Here, not at the end of a job: the other queue's jobs end while this one waits.
         self.app.change(|state| state.question = None);

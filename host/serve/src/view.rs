@@ -20,6 +20,8 @@ pub struct State {
     pub control: ControlState,
     /// Prompt of a job for the browser that has control.
     pub question: Option<String>,
+    /// Number of prompts so far: two with equal words have different numbers.
+    pub questions: u64,
     /// Grows with every change of captures, notes or maps.
     pub captures: u64,
     /// Grows with every change of the optics.

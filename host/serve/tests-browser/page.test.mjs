@@ -342,6 +342,39 @@ test("the guide of the flat series captures targets, learns a correction and fin
   assert.deepEqual(page.complaints, []);
 });
 
+test("two questions with the same words are both asked", async () => {
+  const page = await open(browser, server.address);
+  await page.addInitScript(() => {
+    globalThis.WebSocket = class extends WebSocket {
+      constructor(...given) {
+        super(...given);
+        globalThis.line = this;
+      }
+    };
+  });
+  await page.reload();
+  await page.locator("#who", { hasText: "you have control" }).waitFor();
+  await page.evaluate(() => {
+    globalThis.receive = globalThis.line.onmessage;
+    globalThis.line.onmessage = null;
+  });
+  // Only the newest state reaches a slow page: the one between two questions may be skipped.
+  const question = page.getByText("Put the target at 900 mm");
+  const ask = (questions) => page.evaluate(async (questions) => {
+    const { store } = await import("/link.js");
+    const state = { ...store.state, question: "Put the target at 900 mm", questions };
+    globalThis.receive({ data: JSON.stringify({ type: "state", state }) });
+  }, questions);
+  for (const number of [1, 2]) {
+    await ask(number);
+    await question.waitFor();
+    await page.getByRole("button", { name: "Answer", exact: true }).click();
+    await question.waitFor({ state: "detached" });
+    await ask(number);
+    assert.equal(await question.count(), 0, "it is answered");
+  }
+});
+
 test("the guide of the lens takes a stack, plots blur, response and errors, and puts its lens in use", async () => {
   const page = await open(browser, `${server.address}#guides/lens`);
   const guide = page.locator("#view-guides");

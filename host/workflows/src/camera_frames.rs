@@ -77,7 +77,8 @@ pub fn calibrate(settings: &CalibrateCameraRequest, context: &Context<'_>) -> Re
             let image = read_grey(file)?;
             let holes = image.pixels.iter().filter(|value| !value.is_finite()).count();
             if holes > 0 {
-                let expected = format!("a value in each pixel; {holes} have none (NaN or transparent)");
+                let expected =
+                    format!("expected a value in each pixel, but {holes} have none (NaN or transparent)");
                 return Err(WorkflowError::parameter(kind, file.display(), expected));
             }
             if let Some(white) = image.white_level {

@@ -11,7 +11,7 @@ use crate::{
     context::Context,
     correction_file,
     error::{Result, WorkflowError},
-    figures::rounded,
+    figures::rounded_for,
     measure::read_map,
     request::{PathKind, Request},
 };
@@ -99,10 +99,11 @@ pub fn apply(settings: &CorrectRequest, context: &Context<'_>) -> Result<Correct
         .filter(|change| change.is_finite())
         .collect();
     let had = depth.iter().filter(|depth| depth.is_finite()).count();
+    let (far_mm, near_mm) = correction.range_mm();
     let mean_mm = changes.iter().sum::<f64>() / changes.len().max(1) as f64;
     Ok(CorrectFigures {
         method: correction.method().to_string(),
-        mean_change_mm: rounded(mean_mm, 4),
+        mean_change_mm: rounded_for(far_mm - near_mm, mean_mm, 4),
         lost_pixels: had - changes.len(),
     })
 }

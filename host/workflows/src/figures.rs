@@ -6,11 +6,16 @@ pub fn rounded(value: f64, decimals: i32) -> f64 {
 
 /// Most decimals in addition: doubles have no more digits.
 const MOST_ZEROS: f64 = 12.0;
+/// Most digits before the point of usual sizes.
+const USUAL_DIGITS: f64 = 3.0;
 
-/// [`rounded`] with one more decimal for each zero after the point of `size`, so that micrometres in mm keep their digits.
+/// [`rounded`] with one more decimal for each zero after the point of `size`, so that micrometres in mm keep their digits, and one less
+/// for each digit before it above three.
 pub fn rounded_for(size: f64, value: f64, decimals: i32) -> f64 {
     let zeros = (-size.abs().log10()).ceil() - 1.0;
-    rounded(value, decimals + zeros.clamp(0.0, MOST_ZEROS) as i32)
+    let more = zeros.clamp(0.0, MOST_ZEROS) as i32;
+    let fewer = (-zeros - USUAL_DIGITS).clamp(0.0, MOST_ZEROS) as i32;
+    rounded(value, (decimals + more - fewer).max(0))
 }
 
 #[cfg(test)]
@@ -27,5 +32,12 @@ mod tests {
         assert_eq!(rounded_for(0.0, 0.0, 4), 0.0);
         assert_eq!(rounded_for(f64::NAN, 1.23, 1), 1.2);
         assert!(rounded_for(f64::NAN, f64::NAN, 3).is_nan());
+    }
+
+    #[test]
+    fn large_sizes_have_no_digits_of_noise() {
+        assert_eq!(rounded_for(999.0, 111.398_636, 3), 111.399);
+        assert_eq!(rounded_for(1001.0, 4_617.839_171, 3), 4_617.84);
+        assert_eq!(rounded_for(4e6, 4_617_839.171, 3), 4_617_839.0);
     }
 }

@@ -35,7 +35,7 @@ use crate::{
     MADE_BY,
     context::Context,
     error::{Result, WorkflowError},
-    figures::rounded,
+    figures::{rounded, rounded_for},
     inputs::{HashedFile, hashed},
     request::{PathKind, Request},
     result_folder::{self, STACK_RECORD},
@@ -389,8 +389,11 @@ fn figures(
 ) -> FocusStackFigures {
     let mut values: Vec<f32> = depth.iter().copied().filter(|v| v.is_finite()).collect();
     let middle = values.len() / 2;
-    let median = (!values.is_empty())
-        .then(|| rounded(f64::from(*values.select_nth_unstable_by(middle, f32::total_cmp).1), 3));
+    let [least, most] = [f32::min, f32::max].map(|of| values.iter().copied().reduce(of).unwrap_or_default());
+    let median = (!values.is_empty()).then(|| {
+        let median = *values.select_nth_unstable_by(middle, f32::total_cmp).1;
+        rounded_for(f64::from(most - least), f64::from(median), 3)
+    });
     let known = values.len() as f64 / depth.len().max(1) as f64;
     let ends = map.reliability.iter().filter(|r| **r == 0.0).count() as f64 / depth.len().max(1) as f64;
     if known < LITTLE {

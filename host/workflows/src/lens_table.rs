@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     error::{Result, WorkflowError},
-    figures::rounded,
+    figures::{rounded, rounded_for},
 };
 
 /// Travel per turn of the thesis' micrometer: readings are split into half-millimetres and the rest.
@@ -80,13 +80,15 @@ pub fn calculate(file: &OpticsFile, readings: Readings) -> Result<LensFigures> {
     }
     let optics = file.check()?;
     let range = optics.working_range();
-    let middle_mm = range.alpha0_mm;
-    let per_px = optics.depth_per_alpha_mm(0.0).abs() / optics.max_blur_px();
+    let span_mm = range.far_mm - range.near_mm;
+    // The radius grows from 0 to Rmax for alpha from -1 to 1: half of Rmax per unit of alpha.
+    let per_tenth_px_mm = 0.2 * optics.depth_per_alpha_mm(0.0).abs() / optics.max_blur_px();
+    let footprint_mm = optics.pixel_um() * 1e-3 * (range.alpha0_mm / optics.focal_length_mm() - 1.0);
     let blur = (0..SAMPLES).map(|index| {
         let alpha = -1.0 + 2.0 * index as f64 / (SAMPLES - 1) as f64;
         let [far_px, near_px] = optics.blur_px(alpha);
         Blur {
-            depth_mm: rounded(optics.depth_mm(alpha), 3),
+            depth_mm: rounded_for(span_mm, optics.depth_mm(alpha), 3),
             far_px: rounded(far_px, 3),
             near_px: rounded(near_px, 3),
         }
@@ -95,15 +97,11 @@ pub fn calculate(file: &OpticsFile, readings: Readings) -> Result<LensFigures> {
     Ok(LensFigures {
         range,
         f_number: rounded(optics.f_number(), 4),
-        aperture_mm: rounded(optics.aperture_mm(), 4),
+        aperture_mm: rounded_for(optics.aperture_mm(), optics.aperture_mm(), 4),
         max_blur_px: rounded(optics.max_blur_px(), 4),
-        depth_range_mm: rounded(range.far_mm - range.near_mm, 3),
-        // The radius grows from 0 to Rmax for alpha from -1 to 1: half of Rmax per unit of alpha.
-        depth_per_tenth_px_mm: rounded(0.2 * per_px, 3),
-        pixel_footprint_mm: rounded(
-            optics.pixel_um() * 1e-3 * (middle_mm / optics.focal_length_mm() - 1.0),
-            4,
-        ),
+        depth_range_mm: rounded_for(span_mm, span_mm, 3),
+        depth_per_tenth_px_mm: rounded_for(per_tenth_px_mm, per_tenth_px_mm, 3),
+        pixel_footprint_mm: rounded_for(footprint_mm, footprint_mm, 4),
         reading_far: readings.far_mm.map(reading),
         reading_near: near.map(reading),
         blur: blur.collect(),

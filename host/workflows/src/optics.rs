@@ -24,6 +24,8 @@ use crate::{
     text_file,
 };
 
+pub const KIND: &str = "the optics file";
+
 #[derive(Clone, Debug)]
 pub struct GivenOptics {
     pub path: PathBuf,
@@ -35,7 +37,7 @@ pub struct GivenOptics {
 
 impl GivenOptics {
     pub fn read(path: &Path) -> Result<Self> {
-        let text = text_file::read(path).map_err(WorkflowError::read("the optics file", path))?;
+        let text = text_file::read(path).map_err(WorkflowError::read(KIND, path))?;
         Self::parse(&text, path)
     }
 

@@ -93,19 +93,21 @@ impl Rig {
         context: &Context<'_>,
     ) -> Result<Self> {
         // A silent port takes seconds.
-        let open = |port: String, by: fn(&str) -> Result<Client, ClientError>| {
-            context.cancel.watch("connecting to the board", move || by(&port))
+        let open = |port: String, emulated: bool| {
+            let flag = context.cancel.flag();
+            let connect = move || Client::open_interruptible(&port, emulated, flag);
+            context.cancel.watch("connecting to the board", connect)
         };
         let (mut client, emulation) = match address {
             RigAddress::Attached => {
                 let port = find::board_port().map_err(ClientError::Port)?;
-                (open(port, Client::open)??, None)
+                (open(port, false)??, None)
             }
-            RigAddress::Port(port) => (open(port.clone(), Client::open)??, None),
+            RigAddress::Port(port) => (open(port.clone(), false)??, None),
             RigAddress::Open(rig) => return Ok(rig.connect(context)),
             RigAddress::Emulated(scenery) => {
                 let simulator = Simulator::start(scenery, optics, context)?;
-                let client = open(simulator.port().into(), Client::open_emulated)??;
+                let client = open(simulator.port().into(), true)??;
                 (client, Some((Arc::new(simulator), scenery.clone())))
             }
         };
@@ -120,6 +122,7 @@ impl Rig {
 #[cfg(test)]
 mod tests {
     use std::{
+        io::Read,
         net::TcpListener,
         thread,
         time::{Duration, Instant},
@@ -128,7 +131,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cancelling_ends_the_wait_for_a_silent_port() {
+    fn cancelling_ends_the_wait_for_a_silent_port_and_closes_it() {
         let silent = TcpListener::bind("127.0.0.1:0").unwrap();
         let port = format!("tcp:{}", silent.local_addr().unwrap());
         let context = Context::unattended();
@@ -140,6 +143,9 @@ mod tests {
         let begin = Instant::now();
         let error = Rig::connect(&RigAddress::Port(port), None, &context).err().unwrap();
         assert!(error.is_cancelled() && begin.elapsed() < Duration::from_secs(2), "{error}");
+        let (mut line, _) = silent.accept().unwrap();
+        let _ = line.read_to_end(&mut Vec::new()); // until the other end is closed
+        assert!(begin.elapsed() < Duration::from_secs(2), "held for {:?}", begin.elapsed());
         cancelling.join().unwrap();
     }
 }

@@ -238,6 +238,10 @@ impl Camera for CommandCamera {
         self.drain()
     }
 
+    fn pairs_by_frames_before(&self) -> bool {
+        true
+    }
+
     fn trigger(&mut self, _: u32, _: Micros) -> Result<(), CameraError> {
         Err(CameraError::Trigger { camera: self.kind(), mode: trigger_name(TriggerMode::Software) })
     }

@@ -322,6 +322,10 @@ impl Camera for GenicamCamera {
         mode == TriggerMode::Software || !by_pulse
     }
 
+    fn pairs_by_frames_before(&self) -> bool {
+        true
+    }
+
     fn trigger(&mut self, _: u32, _: Micros) -> Result<(), CameraError> {
         self.camera.software_trigger().map_err(self.failed())
     }

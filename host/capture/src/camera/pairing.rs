@@ -1,5 +1,5 @@
 //! Pairs frames with exposures. One set of rules for all cameras, based on frame count, time stamps, arrival,
-//! file time and pixels. Between arming and the end of a program the n-th frame belongs to the n-th trigger.
+//! file time and pixels. From arming to the end of the last program the n-th frame belongs to the n-th trigger.
 //! The camera's count must advance with the board's trigger number, and its time stamps with the strobe.
 //! Contradictions are errors, never guesses. A surplus or missing frame is found at the end of the program at
 //! the latest ([`super::Camera::finish`]).
@@ -217,8 +217,11 @@ impl Pairing {
         }
         self.contents.extend(evidence.content.map(|content| (content, wanted)));
         let (from, to) = match &self.last {
-            Some((_, last)) => (last.strobe_start.0, shot.strobe_start.0),
-            None => (shot.trigger.0.saturating_sub(u64::from(shot.settle.0)), shot.strobe_end.0),
+            Some((_, last)) if (last.index, last.repeat) < (shot.index, shot.repeat) => {
+                (last.strobe_start.0, shot.strobe_start.0)
+            }
+            // The first of a program: the time since the program before does not count.
+            _ => (shot.trigger.0.saturating_sub(u64::from(shot.settle.0)), shot.strobe_end.0),
         };
         self.longest = self.longest.max(Duration::from_micros(to.saturating_sub(from)));
         self.last = Some((evidence, *shot));
@@ -239,9 +242,19 @@ impl Pairing {
         }
         if let Some((Evidence { stamp: last, .. }, last_shot)) = &self.last {
             let triggers = shot.trigger_number.wrapping_sub(last_shot.trigger_number);
+            let strobes = shot.strobe_start.0.saturating_sub(last_shot.strobe_start.0);
+            let by_board = Duration::from_micros(strobes);
+            let drift = Duration::from_micros(strobes.saturating_mul(DRIFT_PPM) / 1_000_000);
+            let by_camera = last.time.zip(stamp.time).map(|(from, to)| to.saturating_sub(from));
+            let off = by_camera.map(|by_camera| by_camera.abs_diff(by_board));
             if let (Some(from), Some(to)) = (last.count, stamp.count) {
                 let ahead = counted(from, to).saturating_sub(i64::from(triggers));
-                if ahead != 0 {
+                // A camera does not count a trigger that it missed; a continuous run continues after it.
+                let limit = JITTER + drift;
+                let missed = ahead < 0
+                    && off.is_some_and(|off| off <= limit)
+                    && by_board / triggers.max(1) > 2 * limit;
+                if ahead != 0 && !missed {
                     return Ok(u64::try_from(ahead).map_or(Belongs::Earlier, Belongs::Later));
                 }
             } else if triggers != 1 {
@@ -249,17 +262,13 @@ impl Pairing {
                 let reason = format!("the one before it was of exposure {}", last_shot.trigger_number);
                 return Err(mispaired(camera, shot, reason));
             }
-            if let (Some(from), Some(to)) = (last.time, stamp.time) {
-                let by_camera = to.saturating_sub(from);
-                let strobes = shot.strobe_start.0.saturating_sub(last_shot.strobe_start.0);
-                let by_board = Duration::from_micros(strobes);
-                let drift = Duration::from_micros(strobes.saturating_mul(DRIFT_PPM) / 1_000_000);
-                if by_camera.abs_diff(by_board) > self.jitter + drift {
-                    let reason = format!(
-                        "its time stamp lies {by_camera:?} after that of the picture before it, their strobes {by_board:?} apart"
-                    );
-                    return Err(mispaired(camera, shot, reason));
-                }
+            if let (Some(by_camera), Some(off)) = (by_camera, off)
+                && off > self.jitter + drift
+            {
+                let reason = format!(
+                    "its time stamp lies {by_camera:?} after that of the picture before it, their strobes {by_board:?} apart"
+                );
+                return Err(mispaired(camera, shot, reason));
             }
         }
         Ok(Belongs::Here)

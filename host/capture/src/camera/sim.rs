@@ -31,6 +31,7 @@ const BETWEEN_EXPOSURES_US: u32 = 15_000;
 /// Tolerance between strobe and reported exposure start.
 const SAME_MOMENT_US: u64 = 50;
 const WATCH_EXPOSURE: Micros = Micros(5_000);
+const STREAM_ENDED: &str = "the stream has ended";
 
 pub struct SimCamera {
     address: String,
@@ -162,7 +163,7 @@ impl SimCamera {
     }
 
     fn ended(&self) -> CameraError {
-        CameraError::Gone { address: self.address.clone(), reason: "the stream has ended".into() }
+        CameraError::Gone { address: self.address.clone(), reason: STREAM_ENDED.into() }
     }
 
     fn control(&mut self, control: &Control) -> Result<(), CameraError> {
@@ -180,8 +181,9 @@ impl Camera for SimCamera {
     }
 
     fn arm(&mut self, mode: TriggerMode, exposure: Micros) -> Result<(), CameraError> {
-        self.passed = None;
-        // Old images are recognised later by trigger number or time.
+        // Numbers of images from before a reset of the board may come again. Other old images are recognised later by
+        // trigger number or time.
+        (self.early, self.passed) = (None, None);
         let free = mode == TriggerMode::FreeRunning;
         if free {
             let period = Micros(exposure.0.saturating_add(BETWEEN_EXPOSURES_US));
@@ -265,7 +267,13 @@ impl Drop for SimCamera {
 }
 
 fn read_frame(input: &mut impl Read, address: &str) -> Result<Frame, CameraError> {
-    let gone = |error: io::Error| CameraError::Gone { address: address.into(), reason: error.to_string() };
+    let gone = |error: io::Error| {
+        let reason = match error.kind() {
+            io::ErrorKind::UnexpectedEof => STREAM_ENDED.into(),
+            _ => error.to_string(),
+        };
+        CameraError::Gone { address: address.into(), reason }
+    };
     let nonsense = |reason: String| CameraError::Nonsense { address: address.into(), reason };
     let mut length = [0; 4];
     input.read_exact(&mut length).map_err(gone)?;
@@ -317,6 +325,6 @@ mod tests {
         assert!(refused.to_string().contains("another program"), "{refused}");
         let mut cut = frame_bytes(0, 8, &[1, 2]);
         cut.pop();
-        assert!(matches!(reading(cut), CameraError::Gone { .. }));
+        assert!(matches!(reading(cut), CameraError::Gone { reason, .. } if reason == STREAM_ENDED));
     }
 }

@@ -3,7 +3,7 @@
 use std::{
     fs,
     io::{Read, Write},
-    net::TcpListener,
+    net::{TcpListener, TcpStream},
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
@@ -69,19 +69,20 @@ fn reads_new_images_in_order_and_waits_for_incomplete_ones() {
     assert!(late.to_string().contains("exposure 7"), "{late}");
 }
 
+fn send(stream: &mut TcpStream, shot_id: u32) {
+    let header = FrameHeader { shot_id, exposure: BoardMicros(9), width: 2, height: 1, bits: 8 };
+    stream.write_all(&header.length().to_le_bytes()).unwrap();
+    stream.write_all(&header.to_bytes()).unwrap();
+    stream.write_all(&[shot_id as u8, 0, 255, 0]).unwrap();
+}
+
 /// Sends images with these shot ids and disconnects.
 fn endpoint(shots: &'static [u32], trailing: &'static [u8]) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap().to_string();
     thread::spawn(move || {
         let (mut stream, _) = listener.accept().unwrap();
-        for shot_id in shots {
-            let header =
-                FrameHeader { shot_id: *shot_id, exposure: BoardMicros(9), width: 2, height: 1, bits: 8 };
-            stream.write_all(&header.length().to_le_bytes()).unwrap();
-            stream.write_all(&header.to_bytes()).unwrap();
-            stream.write_all(&[*shot_id as u8, 0, 255, 0]).unwrap();
-        }
+        shots.iter().for_each(|shot_id| send(&mut stream, *shot_id));
         stream.write_all(trailing).unwrap();
         if trailing.is_empty() {
             let _ = stream.read(&mut [0]); // until the client hangs up
@@ -100,6 +101,21 @@ fn the_simulators_images_are_matched_to_their_exposures() {
     assert!(matches!(skipped, CameraError::Skipped { wanted: 6, came: 7 }), "{skipped:?}");
     let late = camera.image(&shot(8), Duration::from_millis(30)).unwrap_err();
     assert!(matches!(late, CameraError::Late { .. }), "{late:?}");
+}
+
+#[test]
+fn arming_drops_images_from_before_a_reset_of_the_board() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let mut camera = SimCamera::connect(&listener.local_addr().unwrap().to_string()).unwrap();
+    let (mut simulator, _) = listener.accept().unwrap();
+    let wait = Duration::from_secs(20);
+    send(&mut simulator, 7);
+    let skipped = camera.image(&shot(6), wait).unwrap_err();
+    assert!(matches!(skipped, CameraError::Skipped { wanted: 6, came: 7 }), "{skipped:?}");
+    // Its triggers count from 0 again.
+    camera.arm(TriggerMode::Hardware, Micros(1)).unwrap();
+    send(&mut simulator, 0);
+    assert_eq!(camera.image(&shot(0), wait).unwrap().pixels[[0, 0]], 0);
 }
 
 #[test]

@@ -200,6 +200,7 @@ fn waits_for_surplus_pictures_as_long_as_the_longest_interval() {
         fs::write(folder.path().join(format!("go-{number}")), "").unwrap();
         let mut shot = shot(number);
         (shot.trigger.0, shot.strobe_start.0, shot.strobe_end.0) = (strobe_us, strobe_us, strobe_us);
+        shot.repeat = number as u16;
         camera.image(&shot, WAIT).unwrap();
     }
     assert_eq!(camera.quiet_time(), Duration::from_millis(1_500));

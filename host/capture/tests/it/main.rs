@@ -10,6 +10,7 @@ mod genicam_camera;
 mod gige_rig;
 mod line;
 mod link_rate;
+mod lost_frames;
 mod pair;
 mod requests;
 mod scripted;

@@ -9,7 +9,7 @@ use std::{
 use farnear_capture::{
     Client, ClientError, Timing,
     camera::{Camera, CameraError, FolderCamera, Image},
-    expose::expose_in_parts,
+    expose::{check_shots, expose_in_parts},
     half_mirror::capture_behind_mirror,
     pair::{CaptureError, Exposures, capture_pair},
     plan::SensorPair,
@@ -210,6 +210,41 @@ fn a_surplus_picture_fails_the_pair() {
     assert!(matches!(error, CaptureError::Camera(CameraError::Surplus { .. })), "{error:?}");
 }
 
+/// Half of white at each exposure time.
+#[derive(Default)]
+struct Grey {
+    exposures_us: Vec<u32>,
+}
+
+impl Camera for Grey {
+    fn kind(&self) -> &'static str {
+        "grey"
+    }
+    fn arm(&mut self, _: TriggerMode, _: Micros) -> Result<(), CameraError> {
+        Ok(())
+    }
+    fn trigger(&mut self, _: u32, _: Micros) -> Result<(), CameraError> {
+        Ok(())
+    }
+    fn image(&mut self, shot: &ShotRecord, _: Duration) -> Result<Image, CameraError> {
+        self.exposures_us.push(shot.exposure.0);
+        Ok(Image::new(Array2::from_elem((3, 4), 128), 8))
+    }
+}
+
+#[test]
+fn the_automatic_exposure_time_is_one_that_was_tried() {
+    let (client, _peer) = client();
+    let (mut camera, mut messages) = (Grey::default(), String::new());
+    let auto = Exposures { auto: true, ..exposures() };
+    let pair = capture_pair(&client, &mut camera, &SENSOR, &auto, &mut |text| messages += text).unwrap();
+    let (tried, pair_us) = camera.exposures_us.split_at(camera.exposures_us.len() - 2);
+    assert_eq!(tried.len(), 8, "none is good");
+    assert_eq!(pair_us, [pair.far.record.exposure.0; 2]);
+    assert!(tried.contains(&pair_us[0]), "{pair_us:?} of {tried:?}");
+    assert!(messages.contains("the brightest pixels have 50 % of white"), "{messages}");
+}
+
 #[test]
 fn a_silent_camera_stops_the_rig() {
     let (client, peer) = client();
@@ -248,4 +283,9 @@ fn more_shots_than_the_board_can_hold_run_as_several_programs() {
     let expected = (0_u16..).zip(&shots).map(|(number, shot)| (usize::from(number), shot.target, number));
     assert_eq!(taken, expected.collect::<Vec<_>>());
     assert_eq!(peer.board().acts, 3);
+    let cycle = check_shots(&client, &shots).unwrap_err().to_string();
+    assert!(
+        cycle.contains("1 to 16 shots") && cycle.contains("has 40") && cycle.contains("--runs"),
+        "{cycle}"
+    );
 }

@@ -84,7 +84,7 @@ impl Line {
 fn busy_and_absent_ports_have_different_errors() {
     let line = Line::new();
     let held = serialport::new(line.name(), 115_200).open_native().expect("a free port");
-    capture_fails(&line.name(), &["is busy", &line.name(), "end the program"]);
+    capture_fails(&line.name(), &["is busy", &line.name(), "end that program"]);
     drop(held);
 }
 

@@ -132,6 +132,7 @@ fn the_pages_of_a_tiff_tell_their_step_and_give_the_same_lens() {
     let of_pages =
         figures(&mut farnear(&["calibrate", "stack", &pages, "--plot", &plot, "--out", &lens, "--json"]));
     assert_eq!(of_pages["verdict"].as_str(), Some("good"), "{of_pages}");
+    assert!(of_pages["next"].as_str().is_some_and(|next| next.contains("wrong without a warning")));
     let step = STEP_MM.to_string();
     figures(&mut farnear(&["calibrate", "stack", &target, "--step-mm", &step, "--out", &other, "--json"]));
     let read = |path: &str| fs::read_to_string(path).expect("a lens");

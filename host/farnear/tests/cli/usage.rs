@@ -125,6 +125,7 @@ fn bad_usage_ends_with_2() {
             vec!["'a/2.jpg'", "tip: give the folder of the pictures: a\n"],
         ),
         (vec!["optics"], vec!["an optics file, or --distance-mm"]),
+        (vec!["optics", "far.png"], vec!["tip: a file is given by an option: --optics far.png"]),
         (vec!["depth", "a.png", "--optics", optics], vec!["<NEAR>"]),
         (
             vec!["depth", "a.png", "b.png", "--optics", optics, "--window", "4"],
@@ -219,7 +220,9 @@ fn completions_name_the_commands() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disk_behind_stdout_is_a_failure() {
-    for arguments in [vec!["optics", "--optics", rig_optics()], vec!["completions", "bash"]] {
+    for arguments in
+        [vec!["optics", "--optics", rig_optics()], vec!["completions", "bash"], vec!["depth", "--help"]]
+    {
         let full = File::options().write(true).open("/dev/full").expect("Linux has /dev/full");
         let child = std::process::Command::new(env!("CARGO_BIN_EXE_farnear"))
             .args(&arguments)
@@ -236,7 +239,9 @@ fn a_full_disk_behind_stdout_is_a_failure() {
 
 #[test]
 fn a_closed_stdout_ends_the_program_without_a_message() {
-    for arguments in [vec!["optics", "--optics", rig_optics()], vec!["activity", "models", "--sheet"]] {
+    for arguments in
+        [vec!["optics", "--optics", rig_optics()], vec!["activity", "models", "--sheet"], vec!["--help"]]
+    {
         let (reader, writer) = std::io::pipe().expect("a pipe");
         drop(reader);
         let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_farnear"));

@@ -46,6 +46,10 @@ pub(super) fn images(path: &Path) -> Result<Series, StackError> {
     if let Some([first, second]) = order::same_stem(&series.images) {
         return Err(VideoError::SameStem { first, second }.into());
     }
+    if let Some([first, second]) = order::same_number(&series.images) {
+        return Err(StackError::SameNumber { first: first.clone(), second: second.clone() });
+    }
+    series.remarks.extend(order::ambiguity(&series.images));
     // A camera's raw file has the name of its JPEG.
     let missing = |file: &&PathBuf| !stems.contains(&order::stem(file)) && series.would_hold(file);
     if let Some(unread) = others.iter().filter(missing).find_map(|file| image_file::unread(file)) {
@@ -132,6 +136,16 @@ mod tests {
     fn jfif_is_jpeg() {
         let mixed = folder(&[("i1.jpg", b"\xff\xd8"), ("i2.jfif", b"\xff\xd8"), ("i3.JPE", b"\xff\xd8")]);
         assert_eq!(list(mixed.path()).unwrap().images.len(), 3);
+    }
+
+    #[test]
+    fn a_number_that_is_written_twice_is_refused_and_a_doubtful_one_is_stated() {
+        let twice = folder(&["z01.png", "z1.png", "z2.png"].map(|name| (name, b"".as_slice())));
+        let error = list(twice.path()).unwrap_err().to_string();
+        assert!(error.contains("z01.png and ") && error.contains("the same number"), "{error}");
+        let grid = ["t1,1.png", "t1,2.png", "t2,1.png", "t2,2.png"];
+        let grid = folder(&grid.map(|name| (name, b"".as_slice())));
+        assert!(list(grid.path()).unwrap().remarks[0].contains("a grid"));
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::{
     path::PathBuf,
 };
 
+use super::positions::unit_um;
 use crate::order::{
     self,
     name::{Name, Number},
@@ -60,6 +61,13 @@ impl Series {
             unreachable!("at least one image has a pattern")
         };
         let of_pattern: Vec<Name> = within.iter().map(|index| names[*index].clone()).collect();
+        let units = units(&names, &of_pattern);
+        if units.len() > 1 {
+            return Err(format!(
+                "the positions in its images' names are in several units ({}): write them in one unit",
+                units.join(", ")
+            ));
+        }
         let others = names.len() - within.len() - usize::from(bare.is_some());
         let mut remarks = Vec::new();
         if others as f64 > FEW * within.len() as f64 || pattern.len() == 1 {
@@ -122,6 +130,25 @@ fn without_number(images: &[PathBuf], names: &[Name]) -> Option<usize> {
     let begins = images.iter().all(|path| order::stem(path).starts_with(&stem));
     let alike = names.iter().filter(|name| name.texts == names[shortest].texts).count();
     (begins && alike == 1).then_some(shortest)
+}
+
+/// Units of length in names that begin alike, after the first number that varies in the pattern.
+fn units<'a>(names: &'a [Name], of_pattern: &[Name]) -> Vec<&'a str> {
+    let Name { texts, numbers } = &of_pattern[0];
+    let varies = |column: &usize| of_pattern.iter().any(|name| name.numbers[*column] != numbers[*column]);
+    let column = (0..numbers.len()).find(varies).unwrap_or(0);
+    let mut units: Vec<(f64, &str)> = Vec::new();
+    for name in names.iter().filter(|name| name.texts.starts_with(&texts[..=column])) {
+        let after = name.texts.get(column + 1).map_or("", String::as_str);
+        let word = after.split(|c: char| !c.is_alphabetic()).find(|word| !word.is_empty());
+        let unit = word.unwrap_or_default();
+        if let Some(um) = unit_um(unit)
+            && units.iter().all(|(other, _)| *other != um)
+        {
+            units.push((um, unit));
+        }
+    }
+    units.into_iter().map(|(_, unit)| unit).collect()
 }
 
 /// Whether a number after the same text tells all names apart: `1 near`, `2 far`.
@@ -279,6 +306,39 @@ mod tests {
             of(&|z| format!("2024-05-01_c1_z{z}.png")),
         ] {
             assert_eq!((found.images.len(), found.remarks), (6, vec![]));
+        }
+    }
+
+    #[test]
+    fn positions_in_several_units_are_refused() {
+        let of = |name: &dyn Fn(u32) -> String| series(&(1..=20).map(name).collect::<Vec<_>>());
+        let tenths = |z: u32| f64::from(z) / 10.0;
+        let from = |last: u32, z: u32, [small, large]: [String; 2]| if z <= last { small } else { large };
+        for (several, units) in [
+            (
+                of(&|z| from(9, z, [format!("{z}00um.png"), format!("{}mm.png", z.saturating_sub(9))])),
+                "mm, um",
+            ),
+            (
+                of(&|z| from(2, z, [format!("{z}00um.png"), format!("{}mm.png", z.saturating_sub(2))])),
+                "mm, um",
+            ),
+            (of(&|z| from(9, z, [format!("z{z}00nm.tif"), format!("z{:.1}um.tif", tenths(z))])), "um, nm"),
+            (of(&|z| from(9, z, [format!("{z}00_um.png"), format!("{:.1}_mm.png", tenths(z))])), "mm, um"),
+            (of(&|z| from(9, z, [format!("f2_{z}0cm.png"), format!("f2_{:.1}m.png", tenths(z))])), "m, cm"),
+            (series(&["900um.png", "1mm.png"]), "mm, um"),
+        ] {
+            let error = several.unwrap_err();
+            assert!(error.contains(&format!("several units ({units})")), "{error}");
+        }
+        for one in [
+            of(&|z| {
+                format!("{z:03}_{}", from(9, z, [format!("{z}00um.png"), format!("{:.1}mm.png", tenths(z))]))
+            }),
+            of(&|z| format!("z{z}_{}nm.png", 400 + 10 * z)),
+            of(&|z| format!("{z}{}.png", if z < 3 { "um" } else { "\u{b5}m" })),
+        ] {
+            one.unwrap();
         }
     }
 

@@ -77,21 +77,27 @@ fn image_j(description: &str, pages: usize) -> Result<(Option<Vec<f64>>, Option<
             "its description has {images} images and the file lists {pages}: open it in ImageJ and save it as an image sequence"
         ));
     }
-    let Some(unit) = value("zunit").or(value("unit")) else { return Ok((None, None)) };
+    let unit = value("zunit").or(value("unit")).unwrap_or("none");
     let spacing = match value("spacing") {
         Some(text) => text.parse::<f64>().ok().filter(|spacing| spacing.is_finite() && *spacing != 0.0),
         None => Some(1.0),
     };
-    let Some(spacing) = spacing.zip(unit_um(unit)).map(|(spacing, um)| spacing * um).filter(|_| pages > 1)
-    else {
-        return Ok((None, None));
+    let Some(spacing) = spacing.filter(|_| pages > 1) else { return Ok((None, None)) };
+    let Some(um) = unit_um(unit) else {
+        let remark = (spacing != 1.0).then(|| {
+            format!(
+                "the file states a spacing of the planes ({spacing}) in {unit}, which is not a unit of length: it is not used; set the unit \
+                 in ImageJ (Image > Properties)"
+            )
+        });
+        return Ok((None, remark));
     };
     let remark = value("spacing").is_none().then(|| {
         format!(
             "the file states a unit ({unit}) and no spacing of the planes: it counts as 1 {unit}, as in ImageJ (Image > Properties)"
         )
     });
-    Ok((Some((0..pages).map(|page| page as f64 * spacing).collect()), remark))
+    Ok((Some((0..pages).map(|page| page as f64 * (spacing * um)).collect()), remark))
 }
 
 /// An array in the pages, as `tifffile` describes it: `{"shape": [5, 300, 400], "axes": "ZYX"}`; axes are optional.
@@ -115,7 +121,11 @@ impl<'a> Array<'a> {
     /// Fails if the pages are not images of one focus series.
     fn check(&self, page: &Directory, pages: usize) -> Result<(), String> {
         let shape = self.shape.iter().map(u64::to_string).collect::<Vec<_>>().join(" x ");
-        if page.photometric == 2 && page.planar == 2 && !self.axes.is_some_and(|axes| axes.contains('S')) {
+        let has_colours = match self.axes {
+            Some(axes) => axes.contains('S'),
+            None => matches!(self.shape.as_slice(), [planes, 3, _, _] if *planes > 1),
+        };
+        if page.photometric == 2 && page.planar == 2 && !has_colours {
             return Err(format!(
                 "it is an array of {shape} whose {} planes are marked as colours: write focus planes with photometric='minisblack', \
                  colours with metadata={{'axes': ...}} that has S for their axis",
@@ -160,7 +170,7 @@ fn one_series(channels: usize, times: usize) -> Result<(), String> {
 }
 
 /// Micrometres per unit; `None` for pixels and unknown units.
-fn unit_um(unit: &str) -> Option<f64> {
+pub(super) fn unit_um(unit: &str) -> Option<f64> {
     let mut unit = unit.trim().to_lowercase();
     for micro in ["\\u00b5", "\\u03bc", "&#181;", "&#xb5;", "&#956;", "&#x3bc;", "\u{b5}", "\u{3bc}"] {
         unit = unit.replace(micro, "u");
@@ -234,8 +244,13 @@ pub(super) mod tests {
         }
         let (positions, remark) = spaced("unit=um\n");
         assert!(positions == Some(1.0) && remark.contains("counts as 1 um"), "{remark}");
-        for lines in ["unit=pixel\n", "unit=ms\n", "unit=um\nspacing=0\n", ""] {
+        for lines in ["unit=pixel\n", "unit=ms\n", "unit=um\nspacing=0\n", "", "spacing=1.0\n"] {
             assert_eq!(spaced(lines), (None, none()), "{lines}");
+        }
+        for (lines, unit) in [("unit=pixel\nspacing=2\n", "(pixel)"), ("spacing=2.0\n", "(none)")] {
+            let (positions, remark) = spaced(lines);
+            assert_eq!(positions, None);
+            assert!(remark.contains("planes (2)") && remark.contains(unit), "{remark}");
         }
     }
 
@@ -267,6 +282,14 @@ pub(super) mod tests {
         assert!(refused(1, &volume, "{\"shape\": [5, 6, 8]}").contains("a volume of 5 slices"));
         assert!(refused(3, &planes, "{\"shape\": [3, 4, 6, 8]}").contains("4 planes are marked as colours"));
         assert_eq!(of_array(3, &planes, "{\"shape\": [3, 4, 6, 8], \"axes\": \"ZSYX\"}"), Ok(None));
+        let colours = Directory { samples_per_pixel: 3, ..planes.clone() };
+        assert_eq!(of_array(5, &colours, "{\"shape\": [5, 3, 6, 8]}"), Ok(None));
+        for (count, shape) in [(1, "[3, 6, 8]"), (1, "[1, 3, 6, 8]"), (5, "[5, 3, 6, 8], \"axes\": \"ZTYX\"")]
+        {
+            let text = format!("{{\"shape\": {shape}}}");
+            let error = of_array(count, &colours, &text).unwrap_err();
+            assert!(error.contains("3 planes are marked as colours"), "{error}");
+        }
         // Written one by one, each with its own description.
         assert_eq!(of_array(5, &grey, "{\"shape\": [6, 8]}"), Ok(None));
     }

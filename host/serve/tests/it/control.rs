@@ -97,14 +97,15 @@ fn a_question_stays_until_it_is_answered_or_its_job_is_stopped() {
         assert_eq!(begun.status, 200, "{begun:?}");
         let state = served.state_when(|state| !state["question"].is_null());
         assert!(state["question"].as_str().unwrap().contains("900.5 mm"), "{state:#}");
-        begun.json()["job"].clone()
+        (begun.json()["job"].clone(), state["questions"].clone())
     };
-    let stopped = series();
+    let (stopped, first) = series();
     assert_eq!(served.post("/api/stop", "", "{}").status, 200);
     assert_eq!(served.ended("job", &stopped)["phase"], "stopped");
     assert!(served.get("/api/state").json()["question"].is_null());
 
-    let waiting = series();
+    let (waiting, second) = series();
+    assert_ne!(first, second, "two questions with equal words");
     let computed = served.post("/api/captures/pair-001/depth", &holder.secret, "{}");
     assert_eq!(computed.status, 200, "{computed:?}");
     served.ended("computation", &computed.json()["job"]);

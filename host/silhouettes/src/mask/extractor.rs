@@ -212,8 +212,8 @@ impl Extractor {
 
     /// Why the masks of all frames so far are doubtful.
     #[must_use]
-    pub fn doubt(&self) -> Option<String> {
-        self.chooser.doubt()
+    pub fn doubts(&self) -> Vec<String> {
+        self.chooser.doubts()
     }
 
     #[must_use]

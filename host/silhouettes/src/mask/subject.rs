@@ -116,8 +116,34 @@ pub struct SubjectChooser {
     /// Areas of the last subjects that no edge cuts.
     areas: VecDeque<usize>,
     smaller_frames: u32,
-    subjects: usize,
+    left_out: usize,
+    pieces: Pieces,
+}
+
+/// Number of pieces of the people so far.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pieces {
+    people: usize,
     pieces: usize,
+}
+
+impl Pieces {
+    pub fn count(&mut self, person: &Person) {
+        self.people += 1;
+        self.pieces += person.fragments.len();
+    }
+
+    /// Why the masks of all people so far are doubtful.
+    #[must_use]
+    pub fn doubt(&self) -> Option<String> {
+        let pieces = self.pieces as f64 / self.people.max(1) as f64;
+        (self.people >= KNOWN_AFTER && pieces > MOST_PIECES).then(|| {
+            format!(
+                "the person is in {pieces:.1} pieces on average, so that masks and answers are doubtful: does the camera move, does \
+                 its exposure drift, or do the clothes resemble the background?"
+            )
+        })
+    }
 }
 
 impl SubjectChooser {
@@ -129,21 +155,23 @@ impl SubjectChooser {
             absent_frames: 0,
             areas: VecDeque::new(),
             smaller_frames: 0,
-            subjects: 0,
-            pieces: 0,
+            left_out: 0,
+            pieces: Pieces::default(),
         }
     }
 
     /// Why the masks of all frames so far are doubtful.
     #[must_use]
-    pub fn doubt(&self) -> Option<String> {
-        let pieces = self.pieces as f64 / self.subjects.max(1) as f64;
-        (self.subjects >= KNOWN_AFTER && pieces > MOST_PIECES).then(|| {
+    pub fn doubts(&self) -> Vec<String> {
+        let left_out = (self.left_out > 0).then(|| {
             format!(
-                "the person is in {pieces:.1} pieces on average, so that masks and answers are doubtful: does the camera move, does \
-                 its exposure drift, or do the clothes resemble the background?"
+                "{} frames have an empty mask, because all that moves in them is below {:.0} % of the usual area of the person before: \
+                 noise, a part of a person, or a person much farther away",
+                self.left_out,
+                100.0 * self.settings.usual_share
             )
-        })
+        });
+        self.pieces.doubt().into_iter().chain(left_out).collect()
     }
 
     /// Median; `None` before the first [`KNOWN_AFTER`] areas.
@@ -175,6 +203,7 @@ impl SubjectChooser {
                 self.last = None;
             }
             self.smaller_frames = self.smaller_frames.saturating_add(u32::from(largest > 0));
+            self.left_out += usize::from(largest > 0);
             if self.smaller_frames >= self.settings.forget_area_after_frames {
                 self.areas.clear();
             }
@@ -182,8 +211,7 @@ impl SubjectChooser {
         };
         (self.absent_frames, self.smaller_frames) = (0, 0);
         self.last = Some(subject.centroid());
-        self.subjects += 1;
-        self.pieces += subject.fragments.len();
+        self.pieces.count(subject);
         let mut flags = Vec::new();
         if people.len() > 1 {
             flags.push(Flag::SeveralPeople { count: people.len() });
@@ -289,6 +317,11 @@ mod tests {
         assert!(is_chosen(&people(&[[60, 40, 100, 55]])));
         let refused = (0..1000).take_while(|_| !is_chosen(&noise)).count();
         assert_eq!(refused, 500);
+        let doubts = chooser.doubts().join("; ");
+        assert!(
+            doubts.starts_with("700 frames have an empty mask") && doubts.contains("below 10 %"),
+            "{doubts}"
+        );
     }
 
     #[test]
@@ -324,9 +357,9 @@ mod tests {
             for _ in 0..20 {
                 chooser.choose(people(&stripes[..pieces]).view());
             }
-            let doubt = chooser.doubt();
-            assert_eq!(doubt.is_some(), expected.is_some(), "{doubt:?}");
-            assert!(expected.is_none_or(|part| doubt.is_some_and(|doubt| doubt.contains(part))), "{pieces}");
+            let doubts = chooser.doubts();
+            assert_eq!(doubts.len(), usize::from(expected.is_some()), "{doubts:?}");
+            assert!(expected.is_none_or(|part| doubts[0].contains(part)), "{doubts:?}");
         }
     }
 

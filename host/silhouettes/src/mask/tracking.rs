@@ -11,7 +11,7 @@ use super::{
     BoundingBox, Mask,
     assignment::assigned,
     people::{Person, people},
-    subject::SubjectSettings,
+    subject::{Pieces, SubjectSettings},
 };
 use motion::Motion;
 
@@ -151,12 +151,19 @@ pub struct Tracker {
     settings: TrackingSettings,
     tracks: Vec<Track>,
     people: usize,
+    pieces: Pieces,
 }
 
 impl Tracker {
     #[must_use]
     pub fn new(settings: TrackingSettings) -> Self {
-        Self { settings, tracks: Vec::new(), people: 0 }
+        Self { settings, tracks: Vec::new(), people: 0, pieces: Pieces::default() }
+    }
+
+    /// Why the masks of all people so far are doubtful.
+    #[must_use]
+    pub fn doubt(&self) -> Option<String> {
+        self.pieces.doubt()
     }
 
     /// All people in the next frame's cleaned mask, without those who have left.
@@ -295,6 +302,7 @@ impl Tracker {
             self.people += 1;
             track.person = self.people;
         }
+        self.pieces.count(blob);
         let before = std::mem::take(&mut track.before);
         Sight::Alone { mask, bounds, cut_by_edge: bounds.touches_edge(size), before }
     }

@@ -1,4 +1,4 @@
-//! Common parts of all body recordings: missing points written as zeros, and a plausible size.
+//! Common parts of all body recordings: missing points written as zeros, a missing neck, and a plausible size.
 
 use super::posture::body_points;
 use super::recording::{Known, Source, Unit};
@@ -35,6 +35,27 @@ pub fn hide_zeros(frames: &mut [Vec<Option<Point3>>]) -> usize {
         }
     }
     hidden
+}
+
+/// Adds a missing neck between the shoulders: the templates of keypoints join the head to the trunk by it. `aliases` are other
+/// names of points.
+pub fn add_neck(names: &mut Vec<String>, aliases: &[(usize, String)], frames: &mut [Vec<Option<Point3>>]) {
+    let place = |wanted: &str| {
+        let alias = || aliases.iter().find(|(_, alias)| alias == wanted).map(|(place, _)| *place);
+        names.iter().position(|name| name == wanted).or_else(alias)
+    };
+    let shoulders = place("left shoulder").zip(place("right shoulder"));
+    let (Some((left, right)), None) = (shoulders, place("shoulder centre")) else { return };
+    let neck = place("neck").unwrap_or(names.len());
+    if neck == names.len() {
+        names.push("neck".into());
+    }
+    for frame in frames {
+        frame.resize(names.len(), None);
+        if let (None, Some(a), Some(b)) = (frame[neck], frame[left], frame[right]) {
+            frame[neck] = Some(std::array::from_fn(|k| 0.5 * (a[k] + b[k])));
+        }
+    }
 }
 
 fn inside(frame: &[Option<Point3>]) -> bool {
@@ -87,6 +108,31 @@ fn median_extent(frames: &[Vec<Option<Point3>>], body: &[usize]) -> Option<f64> 
 #[cfg(test)]
 mod tests {
     use super::super::{read, recording::Choices};
+
+    #[test]
+    fn a_neck_is_added_to_keypoints_in_space_and_joins_the_head() {
+        let joints = [
+            ("nose", [0.1, 0.0, 1.6]),
+            ("left_shoulder", [0.0, 0.2, 1.4]),
+            ("right_shoulder", [0.0, -0.2, 1.4]),
+            ("left_elbow", [0.0, 0.3, 1.1]),
+            ("right_elbow", [0.0, -0.3, 1.1]),
+            ("left_wrist", [0.0, 0.3, 0.9]),
+            ("right_wrist", [0.0, -0.3, 0.9]),
+            ("left_hip", [0.0, 0.1, 0.9]),
+            ("right_hip", [0.0, -0.1, 0.9]),
+            ("left_knee", [0.0, 0.1, 0.5]),
+            ("right_knee", [0.0, -0.1, 0.5]),
+            ("left_ankle", [0.0, 0.1, 0.1]),
+            ("right_ankle", [0.0, -0.1, 0.1]),
+        ];
+        let header = joints.map(|(name, _)| format!("{name}_x,{name}_y,{name}_z")).join(",");
+        let row = joints.map(|(_, place)| place.map(|v| v.to_string()).join(",")).join(",");
+        let found = read(format!("{header}\n{row}\n").as_bytes(), "csv", Choices::default());
+        let found = found.expect("a table");
+        assert_eq!(found.by_name(0)["neck"], [0.0, 0.0, 1400.0]);
+        assert_eq!(found.names.len(), 14);
+    }
 
     fn csv(rows: &[[f64; 12]]) -> String {
         let mut text = String::from("A_x,A_y,A_z,B_x,B_y,B_z,C_x,C_y,C_z,D_x,D_y,D_z\n");

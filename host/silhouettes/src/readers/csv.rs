@@ -84,7 +84,7 @@ fn joined(mut rows: Vec<StringRecord>) -> Vec<StringRecord> {
 
 /// A table with one row of names.
 fn plain(columns: &StringRecord, rows: &[StringRecord]) -> Result<Found, RecordingError> {
-    let mut markers = markers_of(columns, coordinate)?;
+    let mut markers = markers_of::<3>(columns, coordinate)?;
     let is_separated = !markers.is_empty();
     if !is_separated {
         let all: HashSet<&str> = columns.iter().collect();
@@ -138,21 +138,21 @@ pub(super) fn check_width(row: &StringRecord, columns: &StringRecord) -> Result<
     Err(RecordingError::Line { line: line(row), reason })
 }
 
-type Marker = (String, [Option<usize>; 3]);
+type Marker<const FIELDS: usize> = (String, [Option<usize>; FIELDS]);
 
-/// Names, with the columns of x, y and z.
-pub(super) fn markers_of(
+/// Names, with the columns of x, y, z and perhaps more.
+pub(super) fn markers_of<const FIELDS: usize>(
     columns: &StringRecord,
     coordinate: impl Fn(&str) -> Option<(&str, usize)>,
-) -> Result<Vec<Marker>, RecordingError> {
-    let mut markers: Vec<Marker> = Vec::new();
+) -> Result<Vec<Marker<FIELDS>>, RecordingError> {
+    let mut markers: Vec<Marker<FIELDS>> = Vec::new();
     for (index, column) in columns.iter().enumerate() {
         let Some((name, axis)) = coordinate(column) else {
             continue;
         };
         let known = markers.iter().position(|(known, _)| known == name);
         let marker = known.unwrap_or_else(|| {
-            markers.push((name.to_owned(), [None; 3]));
+            markers.push((name.to_owned(), [None; FIELDS]));
             markers.len() - 1
         });
         if markers[marker].1[axis].replace(index).is_some() {

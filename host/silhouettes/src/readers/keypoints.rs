@@ -30,7 +30,6 @@ pub const READER: Reader = Reader {
 const BONES_MM: [([usize; 2], f64); 4] =
     [([16, 18], 420.0), ([17, 19], 420.0), ([18, 20], 420.0), ([19, 21], 420.0)];
 const TRUNK_MM: f64 = 500.0;
-const NECK: usize = 6;
 const HEAD: [usize; 6] = [0, 1, 2, 3, 4, 5];
 const ANKLES: [usize; 2] = [20, 21];
 const SHOULDERS: [usize; 2] = [8, 9];
@@ -113,7 +112,7 @@ fn found(document: Document, choices: Choices, about: Option<String>) -> Result<
         let points = frames.iter_mut().flatten().flat_map(|person| person.points.iter_mut().flatten());
         points.for_each(|point| point[across] *= aspect);
     }
-    let (mut tracks, others) = people::followed(&frames);
+    let (tracks, others) = people::followed(&frames);
     if tracks.len() > 1 {
         let left_out =
             if others > 0 { format!("; {others} who are seen less are left out") } else { String::new() };
@@ -122,7 +121,8 @@ fn found(document: Document, choices: Choices, about: Option<String>) -> Result<
             "{count} people, the one seen most first (--person selects one, default 1){left_out}"
         ));
     }
-    tracks.iter_mut().flatten().for_each(|points| add_neck(points));
+    let drawn = tracks.get(choices.person.unwrap_or(1).saturating_sub(1));
+    remarks.extend(drawn.and_then(|frames| unseen(frames)));
     let mut all = tracks.into_iter();
     let frames = all.next().unwrap_or_else(|| vec![vec![None; NAMES.len()]; frames.len()]);
     let (unit, up) = if has_depth {
@@ -148,10 +148,13 @@ fn middle(points: &[Option<Point3>], [a, b]: [usize; 2]) -> Option<Point3> {
     Some(std::array::from_fn(|k| 0.5 * (a[k] + b[k])))
 }
 
-fn add_neck(points: &mut [Option<Point3>]) {
-    if !points.is_empty() && points[NECK].is_none() {
-        points[NECK] = middle(points, SHOULDERS);
-    }
+/// Joints of arms and legs that no frame shows.
+fn unseen(frames: &[Vec<Option<Point3>>]) -> Option<String> {
+    let is_seen = |place: usize| frames.iter().any(|points| points.get(place).is_some_and(Option::is_some));
+    let limbs = (SHOULDERS[0]..SHOULDERS[0] + 6).chain(HIPS[0]..HIPS[0] + 6);
+    let names: Vec<&str> = limbs.filter(|place| !is_seen(*place)).map(|place| NAMES[place]).collect();
+    (!names.is_empty())
+        .then(|| format!("no frame shows {}: the body is drawn without them", names.join(", ")))
 }
 
 /// Millimetres per unit of the file, for an adult's trunk and legs.

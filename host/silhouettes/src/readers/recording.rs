@@ -216,19 +216,20 @@ impl Found {
 
     /// Converts to millimetres, z up. Hides non-finite points and 0, 0, 0 (missing in many exports).
     pub fn settled(self, choices: Choices) -> Recording {
-        let (mut frames, mut remarks) = (self.frames, self.remarks);
+        let (mut names, mut frames, mut remarks) = (self.names, self.frames, self.remarks);
         let hidden = body::hide_zeros(&mut frames);
         if hidden > 0 {
             remarks.push(format!("{hidden} points at exactly 0, 0, 0 are treated as missing markers"));
         }
-        let repeated = repeated(&self.names);
+        let repeated = repeated(&names);
         if !repeated.is_empty() {
             remarks.push(format!(
                 "points share a name ({}): in each frame the last visible one is used; rename the others",
                 repeated.join(", ")
             ));
         }
-        let anatomy = Anatomy::of(&self.names);
+        let anatomy = Anatomy::of(&names);
+        body::add_neck(&mut names, &anatomy.aliases, &mut frames);
         let unit = body::plausible(self.unit.unless(choices.unit), &frames, &anatomy.body);
         let (up, inverted) = posture::checked(self.up.unless(choices.up), &frames, &anatomy);
         let lying = posture::lying(up.value, &frames, &anatomy, self.planar);
@@ -238,7 +239,7 @@ impl Found {
         }
         remarks.extend(anatomy.remark.into_iter().chain(inverted).chain(lying));
         Recording {
-            names: self.names,
+            names,
             rate_hz: self.rate_hz,
             frames,
             planar: self.planar,

@@ -24,7 +24,7 @@ pub fn find(names: &[String]) -> Option<Aliases> {
     let templates = || Template::names().filter_map(|name| Template::named(name).ok());
     let fitting = templates().filter(|template| template.check(names).is_ok());
     let known = fitting.map(|template| template.coverage(names).0).max().unwrap_or(0);
-    let simple: Vec<String> = names.iter().map(|name| simplified(name)).collect();
+    let simple = all_simplified(names);
     let of = |template: &Template| -> Vec<Aliases> {
         let table = |naming: Option<&Naming>| {
             let found = matched(&simple, template, naming);
@@ -50,15 +50,18 @@ pub fn find(names: &[String]) -> Option<Aliases> {
     best.filter(|aliases| aliases.names.len() > known)
 }
 
-/// Matches names to the template `keypoints` only; empty if it does not fit.
+/// Matches names to the template `keypoints` only; empty if it does not fit, unless four in five names of a part of a body do.
 pub fn keypoints(names: &[String]) -> Vec<(usize, String)> {
-    let simple: Vec<String> = names.iter().map(|name| simplified(name)).collect();
+    /// Fewer names are not those of a body.
+    const LEAST: usize = 6;
+    let simple = all_simplified(names);
     let Ok(template) = Template::named("keypoints") else { return Vec::new() };
     let namings = NAMINGS.iter().filter(|naming| naming.template == template.name);
     let all = namings.map(|naming| matched(&simple, &template, Some(naming)));
     let best = all.rev().max_by_key(Vec::len).unwrap_or_default();
     let known: Vec<String> = best.iter().map(|(_, name)| name.clone()).collect();
-    if template.check(&known).is_ok() { best } else { Vec::new() }
+    let are_most = best.len() >= LEAST && 5 * best.len() >= 4 * names.len();
+    if are_most || template.check(&known).is_ok() { best } else { Vec::new() }
 }
 
 /// Each point of the template once, with the first matching name.
@@ -97,6 +100,19 @@ fn matched(simple: &[String], template: &Template, naming: Option<&Naming>) -> V
         "Spine".clone_into(lowest);
     }
     found
+}
+
+/// Names simplified, without the text up to `_` that all begin with, such as a rig's.
+fn all_simplified(names: &[String]) -> Vec<String> {
+    let first = names.first().filter(|_| names.len() > 1).map_or("", String::as_str);
+    let ends = first.match_indices('_').map(|(at, _)| at + 1);
+    let is_shared = |end: &usize| names.iter().all(|name| name.starts_with(&first[..*end]));
+    let shared = simplified(&first[..ends.take_while(is_shared).last().unwrap_or(0)]);
+    let own = |name: &String| {
+        let simple = simplified(name);
+        simple.strip_prefix(&shared).unwrap_or(&simple).to_owned()
+    };
+    names.iter().map(own).collect()
 }
 
 /// Lower-case letters and digits, without a subject's name.
@@ -187,6 +203,41 @@ mod tests {
                  foot.L toe.L thigh.R shin.R foot.R toe.R",
                 "bvh",
                 16,
+            ),
+            (
+                "Hips Spine Spine1 Spine2 Spine3 Spine4 Neck Head LeftShoulder LeftArm LeftForeArm LeftHand RightShoulder RightArm \
+                 RightForeArm RightHand LeftThigh LeftShin LeftFoot LeftToe RightThigh RightShin RightFoot RightToe",
+                "bvh",
+                21,
+            ),
+            (
+                "Robot_Hips Robot_Spine Robot_Spine1 Robot_Spine2 Robot_Neck Robot_Head Robot_LeftShoulder Robot_LeftArm \
+                 Robot_LeftForeArm Robot_LeftHand Robot_RightShoulder Robot_RightArm Robot_RightForeArm Robot_RightHand \
+                 Robot_LeftUpLeg Robot_LeftLeg Robot_LeftFoot Robot_LeftToeBase Robot_RightUpLeg Robot_RightLeg \
+                 Robot_RightFoot Robot_RightToeBase",
+                "bvh",
+                20,
+            ),
+            (
+                "J_Bip_C_Hips J_Bip_C_Spine J_Bip_C_Chest J_Bip_C_UpperChest J_Bip_C_Neck J_Bip_C_Head J_Bip_L_UpperArm \
+                 J_Bip_L_LowerArm J_Bip_L_Hand J_Bip_R_UpperArm J_Bip_R_LowerArm J_Bip_R_Hand J_Bip_L_UpperLeg J_Bip_L_LowerLeg \
+                 J_Bip_L_Foot J_Bip_R_UpperLeg J_Bip_R_LowerLeg J_Bip_R_Foot",
+                "bvh",
+                18,
+            ),
+            (
+                "Top.Head Front.Head Rear.Head R.Shoulder R.Elbow R.Wrist L.Shoulder L.Elbow L.Wrist R.ASIS L.ASIS V.Sacral \
+                 R.Thigh R.Knee R.Shank R.Ankle R.Heel R.Toe L.Thigh L.Knee L.Shank L.Ankle L.Heel L.Toe",
+                "keypoints",
+                19,
+            ),
+            (
+                "Sternum R.Acromium L.Acromium Top.Head R.Bicep R.Elbow R.Wrist.Med R.Wrist.Lat L.Bicep L.Elbow L.Wrist.Med \
+                 L.Wrist.Lat R.ASIS L.ASIS V.Sacral R.Thigh.Upper R.Thigh.Front R.Knee.Lat R.Knee.Med R.Shank.Upper \
+                 R.Ankle.Lat R.Ankle.Med R.Heel R.Midfoot.Sup R.Toe.Tip R.Toe.Lat R.Toe.Med L.Thigh.Upper L.Thigh.Front \
+                 L.Knee.Lat L.Knee.Med L.Shank.Upper L.Ankle.Lat L.Ankle.Med L.Heel L.Midfoot.Sup L.Toe.Tip L.Toe.Lat L.Toe.Med",
+                "keypoints",
+                21,
             ),
             (
                 "Ann:Hip Ann:Ab Ann:Chest Ann:Neck Ann:Head Ann:LShoulder Ann:LUArm Ann:LFArm Ann:LHand Ann:RShoulder Ann:RUArm \

@@ -73,4 +73,14 @@ mod tests {
         assert_eq!((joints.head, joints.feet), (vec![11], vec![6, 7, 8, 9]));
         assert!(joints.remark.is_some());
     }
+
+    #[test]
+    fn the_end_site_of_mixamos_head_is_of_the_head() {
+        let names: Vec<String> =
+            "mixamorig:Hips mixamorig:Spine mixamorig:Neck mixamorig:Head mixamorig:HeadTop_End mixamorig:LeftFoot"
+                .split_whitespace()
+                .map(str::to_owned)
+                .collect();
+        assert_eq!(Anatomy::of(&names).head, [3, 4]);
+    }
 }

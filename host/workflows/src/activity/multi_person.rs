@@ -16,7 +16,7 @@ use super::{
     answer::{PersonFigures, PersonFlag, PersonInFrame, outlier_score, rounded_probability},
     person::Person,
     recognise::RecogniseRequest,
-    recognition::{Model, window},
+    recognition::{Model, rate_remark, window},
     views::{Frames, View},
 };
 use crate::{
@@ -91,9 +91,11 @@ impl<'m> MultiPersonTracker<'m> {
             );
         }
         let window = window(recogniser, request)?;
+        let frames = Frames::open(view)?;
+        let rate = rate_remark(recogniser, std::slice::from_ref(view), std::slice::from_ref(&frames));
         Ok(Self {
-            remarks: model.expectation().into_iter().collect(),
-            frames: Frames::open(view)?,
+            remarks: model.expectation().into_iter().chain(rate).collect(),
+            frames,
             tracker: None,
             window,
             people: Vec::new(),
@@ -115,7 +117,10 @@ impl<'m> MultiPersonTracker<'m> {
         let start = Instant::now();
         let moved = self.frames.next_moving()?;
         context.warn(self.frames.take_remarks(), &mut self.remarks);
-        let Some(moved) = moved else { return Ok(None) };
+        let Some(moved) = moved else {
+            context.warn(self.closing_remarks(), &mut self.remarks);
+            return Ok(None);
+        };
         self.count += 1;
         let followed = follow(&mut self.tracker, moved.mask.as_ref().ok());
         let flag = moved.mask.as_ref().err().map(Flag::to_string);
@@ -139,6 +144,14 @@ impl<'m> MultiPersonTracker<'m> {
             people,
             flags: flag.into_iter().collect(),
         }))
+    }
+
+    /// Notices about the whole recording.
+    fn closing_remarks(&self) -> Vec<String> {
+        let joined = (1..).zip(&self.people).filter_map(|(number, tracked)| {
+            Some(format!("person {number}: {}", tracked.person.joined_passages()?))
+        });
+        self.tracker.as_ref().and_then(Tracker::doubt).into_iter().chain(joined).collect()
     }
 
     fn answered(
@@ -251,7 +264,35 @@ fn shown(person: &PersonInFrame) -> Option<Shown> {
 
 #[cfg(test)]
 mod tests {
+    use farnear_files::masks;
+
     use super::*;
+    use crate::activity::views::ViewKind;
+
+    #[test]
+    fn people_in_pieces_and_masks_of_a_high_frame_rate_are_reported() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let view = View { path: folder.path().join("view1"), kind: ViewKind::Masks };
+        std::fs::create_dir(&view.path).expect("a folder");
+        std::fs::write(folder.path().join("silhouettes.toml"), "rate_hz = 100.0\n").expect("written");
+        // Eight stripes.
+        let mask = Mask::from_shape_fn((240, 160), |(row, column)| {
+            (42..154).contains(&row) && row % 14 < 10 && (60..100).contains(&column)
+        });
+        for frame in 0..20 {
+            let png = masks::png(&mask).expect("a picture");
+            std::fs::write(view.path.join(format!("{frame:02}.png")), png).expect("written");
+        }
+        let model = Model::read(std::path::Path::new("everyday")).expect("shipped");
+        let begun = MultiPersonTracker::begin(&model, &view, &RecogniseRequest::default());
+        let mut tracker = begun.expect("masks");
+        let context = Context::unattended();
+        while tracker.next(&context).expect("an answer").is_some() {}
+        let remarks = tracker.finish().expect("an answer").remarks.join("\n");
+        for part in ["view1: 100 frames a second", "in 8.0 pieces on average"] {
+            assert!(remarks.contains(part), "{part}: {remarks}");
+        }
+    }
 
     #[test]
     fn a_person_after_a_changed_scene_is_another_one() {

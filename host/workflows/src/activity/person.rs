@@ -61,9 +61,17 @@ impl<'m> Person<'m> {
         Ok(AnswerSummary::new(self.model.recognise(&whole)?, self.numbers.len()))
     }
 
-    /// Passages of more than [`GAP_FRAMES`] silhouettes, with more frames than that without the person between them.
-    pub fn passages(&self) -> usize {
-        passages(&self.seen(), &self.numbers).iter().filter(|passage| passage.len() > GAP_FRAMES).count()
+    /// A remark on several passages of more than [`GAP_FRAMES`] silhouettes, with more frames than that without the person between
+    /// them.
+    pub fn joined_passages(&self) -> Option<String> {
+        let all = passages(&self.seen(), &self.numbers);
+        let count = all.iter().filter(|passage| passage.len() > GAP_FRAMES).count();
+        (count > 1).then(|| {
+            format!(
+                "the person is not seen between {count} passages, which the answer for the whole joins; use `windows` and \
+                 `segments`, or cut the masks (farnear silhouettes passages) and recognise each passage"
+            )
+        })
     }
 
     /// Frames with a silhouette in a view.

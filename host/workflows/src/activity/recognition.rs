@@ -269,17 +269,10 @@ impl<'m> Recognition<'m> {
 
     /// Notices about the whole recording.
     fn closing_remarks(&self) -> Vec<String> {
-        let doubts = (1..)
-            .zip(&self.views)
-            .filter_map(|(view, frames)| Some(format!("view {view}: {}", frames.doubt()?)));
-        let passages = self.person.passages();
-        let joined = (passages > 1).then(|| {
-            format!(
-                "the person is not seen between {passages} passages, which the answer for the whole joins; use `windows` and \
-                 `segments`, or cut the masks (farnear silhouettes passages) and recognise each passage"
-            )
+        let doubts = (1..).zip(&self.views).flat_map(|(view, frames)| {
+            frames.doubts().into_iter().map(move |doubt| format!("view {view}: {doubt}"))
         });
-        doubts.chain(joined).collect()
+        doubts.chain(self.person.joined_passages()).collect()
     }
 
     /// [`Self::next`] for a frame of each view.
@@ -349,7 +342,7 @@ pub(super) fn window(model: &Recogniser, request: &RecogniseRequest) -> Result<u
 }
 
 /// A remark on views with a higher frame rate than those that a network learned from. Other models learn the user's rate.
-fn rate_remark(model: &Recogniser, views: &[View], frames: &[Frames]) -> Option<String> {
+pub(super) fn rate_remark(model: &Recogniser, views: &[View], frames: &[Frames]) -> Option<String> {
     /// Highest rate of the networks' training clips.
     const LEARNED_HZ: f64 = 26.0;
     /// Windows are too short above it.

@@ -170,10 +170,12 @@ impl Frames {
     }
 
     /// Why the masks of all frames so far are doubtful.
-    pub fn doubt(&self) -> Option<String> {
+    pub fn doubts(&self) -> Vec<String> {
         match self {
-            Self::Masks { first, .. } => first.as_ref()?.chooser.doubt(),
-            Self::Video { extractor, .. } => extractor.as_ref()?.doubt(),
+            Self::Masks { first, .. } => first.iter().flat_map(|first| first.chooser.doubts()).collect(),
+            Self::Video { extractor, .. } => {
+                extractor.iter().flat_map(|extractor| extractor.doubts()).collect()
+            }
         }
     }
 

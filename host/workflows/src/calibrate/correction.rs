@@ -15,7 +15,7 @@ use serde_with::{DisplayFromStr, serde_as};
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
-    figures::rounded,
+    figures::rounded_for,
     measure::read_map,
     request::{PathKind, Request},
 };
@@ -113,13 +113,14 @@ pub fn learn(settings: &CalibrateCorrectionRequest, context: &Context<'_>) -> Re
     for warning in unlike_others(&after) {
         context.progress.warn(&warning);
     }
+    let rounded = |mm: f64| rounded_for(far_mm - near_mm, mm, 4);
     let figures = CorrectionFigures {
         method: correction.method().to_string(),
         patterns: patterns.len(),
         far_mm,
         near_mm,
-        rmse_before_mm: rounded(rmse_mm(&errors(&maps, None)?), 4),
-        rmse_after_mm: rounded(rmse_mm(&after), 4),
+        rmse_before_mm: rounded(rmse_mm(&errors(&maps, None)?)),
+        rmse_after_mm: rounded(rmse_mm(&after)),
     };
     context.cancel.check("learning the correction")?;
     staging::write_file(&settings.out, toml::to_string(&correction)?.as_bytes())?;
@@ -218,10 +219,9 @@ fn unlike_others(errors: &[[f64; 2]]) -> Vec<String> {
     let median = sorted[sorted.len() / 2];
     let unlike = |(_, mm): &(usize, &f64)| **mm > UNLIKE * median;
     let named = |(index, mm): (usize, &f64)| {
-        format!(
-            "pattern {}: an error of {mm:.3} mm remains, {median:.3} mm is usual: is its true_mm right?",
-            index + 1
-        )
+        let [mm, usual] = [*mm, median].map(|mm| rounded_for(median, mm, 3));
+        let number = index + 1;
+        format!("pattern {number}: an error of {mm} mm remains, {usual} mm is usual: is its true_mm right?")
     };
     rmse.iter().enumerate().filter(unlike).map(named).collect()
 }
@@ -239,7 +239,10 @@ mod tests {
         assert!(error.contains("0.9 of pattern 3") && error.contains("905.000 mm"), "{error}");
         let maps = vec![(map.clone(), 904.0), (map.clone(), 905.5), (map.clone(), 904.5), (map, 925.0)];
         let found = unlike_others(&errors(&maps, None).unwrap());
-        assert!(found.len() == 1 && found[0].starts_with("pattern 4: an error of 20.000 mm"), "{found:?}");
+        assert!(
+            found.len() == 1 && found[0].starts_with("pattern 4: an error of 20 mm remains"),
+            "{found:?}"
+        );
     }
 
     /// A list of maps, each in its folder with a record.

@@ -17,7 +17,7 @@ use serde_with::{DisplayFromStr, serde_as};
 use crate::{
     context::Context,
     error::{About, Result, WorkflowError},
-    figures::rounded,
+    figures::{rounded, rounded_for},
     optics,
     request::{PathKind, Request},
 };
@@ -179,7 +179,9 @@ pub fn fit(settings: &CalibratePsfRequest, context: &Context<'_>) -> Result<PsfF
         Psf::Generalised { p, k } => (Some(p), k),
         Psf::PillBox | Psf::Ring { .. } | Psf::Radial(_) => (None, rounded(found.width(), DECIMALS[1])),
     };
-    let targets_mm: Vec<f64> = found.alphas.iter().map(|alpha| rounded(optics.depth_mm(*alpha), 3)).collect();
+    let range = optics.working_range();
+    let target_mm = |alpha: &f64| rounded_for(range.far_mm - range.near_mm, optics.depth_mm(*alpha), 3);
+    let targets_mm: Vec<f64> = found.alphas.iter().map(target_mm).collect();
     Ok(PsfFigures {
         psf: psf.to_string(),
         p,

@@ -25,7 +25,7 @@ use serde_with::{DisplayFromStr, serde_as};
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
-    figures::rounded,
+    figures::{rounded, rounded_for},
     focus_stack::fill_specks,
     optics,
     plot::Format,
@@ -188,7 +188,7 @@ pub fn calibrate(request: &CalibrateStackRequest, context: &Context<'_>) -> Resu
     };
     let (step_mm, pair_step, bin) = (listed.step_mm, request.pair_step, request.bin);
     let settings = StackSettings { step_mm, moved, pair_step, bin, coding };
-    let step_mm = rounded(listed.step_mm, 6);
+    let step_mm = rounded_for(listed.step_mm, listed.step_mm, 6);
     context.info(&format!("calibrating the lens from {} slices {step_mm} mm apart", slices.len()));
     let told = AtomicUsize::new(0);
     let proceed = |tried: usize| {
@@ -297,7 +297,7 @@ fn agrees(step_mm: f64, stated_um: &Result<f64>) -> bool {
 /// What the files' metadata state otherwise than `--step-mm`.
 fn contradiction(step_mm: f64, stated: Option<Result<f64>>) -> Option<String> {
     let stated = match stated.filter(|stated| !agrees(step_mm, stated))? {
-        Ok(step_um) => format!("a step of {} mm", rounded(step_um * 1e-3, 9)),
+        Ok(step_um) => format!("a step of {} mm", rounded_for(step_um * 1e-3, step_um * 1e-3, 4)),
         Err(error) => format!("uneven positions ({error})"),
     };
     Some(format!("the file states {stated}, and --step-mm {step_mm} is used: check the unit"))
@@ -313,8 +313,9 @@ fn even_step(positions: &[f64], request: &CalibrateStackRequest) -> Result<f64> 
     match steps.iter().enumerate().find(|(_, step)| !even(**step)) {
         Some((index, step)) => {
             let (from, to) = (index + 1, index + 2);
+            let [step, usual] = [*step, usual].map(|step| rounded_for(usual, step, 4));
             let expected =
-                format!("even steps, but slices {from} and {to} are {step:.6} apart, {usual:.6} is usual");
+                format!("expected even steps, but slices {from} and {to} are {step} apart, {usual} is usual");
             Err(WorkflowError::parameter("stack", request.stack.display(), expected))
         }
         None => Ok(rounded((steps.iter().sum::<f64>() / steps.len().max(1) as f64).abs(), 9)),
@@ -338,8 +339,9 @@ fn read(
         filled += fill_specks(&mut image.pixels).len();
         let holes = image.pixels.iter().filter(|value| !value.is_finite()).count();
         if holes > 0 {
-            let expected =
-                format!("a value in each pixel; {holes} have none (NaN or transparent): crop or fill them");
+            let expected = format!(
+                "expected a value in each pixel, but {holes} have none (NaN or transparent): crop or fill them"
+            );
             return Err(WorkflowError::parameter("stack", images[index].display(), expected));
         }
         coding += image.coding_variance / images.len() as f64;
@@ -376,11 +378,14 @@ fn figures(
     let middle = plane.at(0.5 * size.0 as f64, 0.5 * size.1 as f64) - 0.5 * pair_step as f64;
     let far = (middle.round().max(0.0) as usize).min(files.len().saturating_sub(pair_step + 1));
     let out = request.out.display();
+    let of_range = |mm: f64| rounded_for(range_mm, mm, 4);
+    let of_error = |mm: f64| rounded_for(held_out.rms_mm, mm, 3);
     let next = match listed.lens {
         Some(_) => format!("farnear rig capture --optics {out} --out pair/"),
         None => format!(
-            "take pairs {pair_step} slices ({} mm) apart, the far-focused image first: farnear depth {} {} --optics {out}",
-            rounded(range_mm, 6),
+            "take pairs {pair_step} slices ({} mm) apart, the far-focused image first (at any other distance depth is wrong \
+             without a warning): farnear depth {} {} --optics {out}",
+            of_range(range_mm),
             files[far].display(),
             files[far + pair_step].display()
         ),
@@ -393,19 +398,19 @@ fn figures(
         bin,
         psf: optics.psf().to_string(),
         max_blur_px: rounded(optics.max_blur_px(), 3),
-        range_mm: rounded(range_mm, 6),
+        range_mm: of_range(range_mm),
         blur_per_slice_px: blur.per_slice_px.map(|blur| rounded(blur, 3)),
         blur: blur.points.iter().map(|p| [p.slices, p.radius_px].map(|value| rounded(value, 3))).collect(),
         blur_floor_px: stage.blur_floor_px,
-        learned_mm: rounded(0.5 * learned(found) * range_mm, 6),
-        robust_mm: rounded(held_out.robust_mm, 6),
-        rms_mm: rounded(held_out.rms_mm, 6),
-        bias_mm: rounded(held_out.bias_mm, 6),
+        learned_mm: of_range(0.5 * learned(found) * range_mm),
+        robust_mm: of_error(held_out.robust_mm),
+        rms_mm: of_error(held_out.rms_mm),
+        bias_mm: of_error(held_out.bias_mm),
         slope: rounded(held_out.slope, 4),
         fill: rounded(held_out.fill, 4),
         within_three: rounded(held_out.within_three, 4),
         scatter: rounded(held_out.scatter, 3),
-        residual_mm: rounded(0.5 * residual * range_mm, 6),
+        residual_mm: of_error(0.5 * residual * range_mm),
         pairs: held_out.pairs,
         response: stage.curve().map(|pair| pair.map(|depth| rounded(depth, 4))).to_vec(),
         by_depth: held_out
@@ -413,9 +418,9 @@ fn figures(
             .iter()
             .map(|at| AtDepth {
                 depth: rounded(at.depth, 3),
-                bias_mm: rounded(at.bias_mm, 6),
-                rms_mm: rounded(at.rms_mm, 6),
-                predicted_mm: rounded(at.predicted_mm, 6),
+                bias_mm: of_error(at.bias_mm),
+                rms_mm: of_error(at.rms_mm),
+                predicted_mm: of_error(at.predicted_mm),
             })
             .collect(),
     }

@@ -22,7 +22,7 @@ use farnear_files::{
     stack,
     staging::{Staging, StagingError},
 };
-use ndarray::{Array2, ArrayView2, CowArray, Ix2, s};
+use ndarray::{Array2, ArrayView2, CowArray, Ix2};
 
 use super::{FocusStackRequest, black_border};
 use crate::{
@@ -47,7 +47,7 @@ pub(super) struct Images<'a> {
     context: &'a Context<'a>,
 }
 
-/// Finite neighbours of 8 of a pixel in a speck; a straight border of pixels without values has 3.
+/// Finite neighbours of 8 of a pixel in a speck; a straight border of pixels without values has 3. Outside the image the nearest pixel counts.
 const AROUND_SPECK: usize = 5;
 /// Least part of a speck in a moved pixel.
 const SPECK: f32 = 0.05;
@@ -61,12 +61,12 @@ pub(crate) fn fill_specks(image: &mut Array2<f32>) -> Vec<(usize, usize)> {
     let original = image.clone();
     let mut specks = Vec::new();
     for (at, value) in image.indexed_iter_mut().filter(|(_, value)| !value.is_finite()) {
-        let rows = at.0.saturating_sub(1)..(at.0 + 2).min(height);
-        let columns = at.1.saturating_sub(1)..(at.1 + 2).min(width);
-        let around = original.slice(s![rows, columns]);
-        let known = || around.iter().filter(|value| value.is_finite());
-        if known().count() >= AROUND_SPECK {
-            *value = known().sum::<f32>() / known().count() as f32;
+        let [rows, columns] = [(at.0, height), (at.1, width)]
+            .map(|(own, size)| [own.saturating_sub(1), own, (own + 1).min(size - 1)]);
+        let around = rows.into_iter().flat_map(|y| columns.map(|x| original[(y, x)]));
+        let known: Vec<f32> = around.filter(|value| value.is_finite()).collect();
+        if known.len() >= AROUND_SPECK {
+            *value = known.iter().sum::<f32>() / known.len() as f32;
             specks.push(at);
         }
     }
@@ -272,9 +272,13 @@ mod tests {
         let mut image = Array2::from_elem((9, 9), 0.5);
         image[(4, 4)] = f32::NAN;
         image[(6, 6)] = f32::INFINITY;
+        image[(8, 8)] = f32::NAN;
+        image[(7, 0)] = f32::NAN;
         image.row_mut(0).fill(f32::NAN);
-        assert_eq!(fill_specks(&mut image), [(4, 4), (6, 6)]);
-        assert_eq!((image[(4, 4)], image[(6, 6)], image[(0, 4)].is_nan()), (0.5, 0.5, true));
+        let specks = [(4, 4), (6, 6), (7, 0), (8, 8)];
+        assert_eq!(fill_specks(&mut image), specks);
+        assert_eq!(specks.map(|at| image[at]), [0.5; 4]);
+        assert!(image.row(0).iter().all(|value| value.is_nan()));
         assert_eq!(fill_specks(&mut Array2::from_elem((3, 3), 1.0)), []);
     }
 }

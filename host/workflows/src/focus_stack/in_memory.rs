@@ -26,8 +26,8 @@ pub struct PreparedStack {
     /// Indices of the images that were left out.
     pub left_out: Vec<usize>,
     pub warnings: Vec<String>,
-    /// Farthest distance that alignment moved a pixel.
-    pub moved_px: f64,
+    /// Farthest distance that alignment moved a pixel; `None` without.
+    pub moved_px: Option<f64>,
     /// Pixels that an image has no value for.
     unseen: Option<Array2<bool>>,
 }
@@ -76,7 +76,7 @@ pub fn prepare_stack(
             *image = resample(image.view(), warp);
         }
     }
-    let moved_px = images.first().map_or(0.0, |first| frames::farthest_px(&frames.warps, first.dim()));
+    let moved_px = model.and(images.first()).map(|first| frames::farthest_px(&frames.warps, first.dim()));
     Ok(PreparedStack { images, positions, left_out, warnings, moved_px, unseen })
 }
 

@@ -234,8 +234,8 @@ pub fn extract(settings: &SilhouettesVideoRequest, context: &Context<'_>) -> Res
     }
     context.warn(video.take_remarks(), &mut remarks);
     context.warn(figures.without_people(), &mut remarks);
-    let doubt = work.extractor.doubt();
-    context.warn(doubt.map(|doubt| format!("{}: {doubt}", settings.video.display())), &mut remarks);
+    let doubts = work.extractor.doubts().into_iter();
+    context.warn(doubts.map(|doubt| format!("{}: {doubt}", settings.video.display())), &mut remarks);
     figures.remarks = remarks;
     figures.changes_of_light = work.extractor.changes_of_light();
     let seconds = start.elapsed().as_secs_f64();

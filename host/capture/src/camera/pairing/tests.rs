@@ -78,7 +78,7 @@ fn accepts_pictures_whose_board_runs_faster_than_the_clock() {
     pairing.begin();
     let armed = pairing.armed.unwrap();
     for (number, arrived_ms) in [(1, 3), (2, 4), (3, 5)] {
-        let shot = long_shot(number, u64::from(number) * 1_000_000);
+        let shot = ShotRecord { repeat: number as u16, ..long_shot(number, u64::from(number) * 1_000_000) };
         pairing.reported(&shot, armed + Duration::from_millis(arrived_ms));
         let arrived = Some(armed + Duration::from_millis(arrived_ms));
         let evidence = Evidence { arrived, ..Evidence::default() };
@@ -200,6 +200,19 @@ fn count_and_time_must_agree() {
     assert_eq!(judge(Some(65_535), Some(9_100_000), shot(7, 400_000)).unwrap(), Belongs::Earlier);
     let error = judge(Some(2), Some(9_400_000), shot(7, 400_000)).unwrap_err().to_string();
     assert!(error.contains("exposure 7") && error.contains("200ms") && error.contains("100ms"), "{error}");
+}
+
+#[test]
+fn a_trigger_that_the_camera_missed_is_recognised_by_time() {
+    let mut pairing = Pairing::default();
+    let mut judge = |count, time, shot| pairing.judge("c", stamp(Some(count), Some(time)), &shot).unwrap();
+    assert_eq!(judge(1, 5_000, shot(1, 100_000)), Belongs::Here);
+    // Trigger 2 gave neither strobe nor frame.
+    assert_eq!(judge(2, 205_100, shot(3, 300_000)), Belongs::Here);
+    assert_eq!(judge(3, 305_100, shot(4, 400_000)), Belongs::Here);
+    // Trigger 5 gave a frame, and the strobe was lost.
+    assert_eq!(judge(4, 405_100, shot(6, 600_000)), Belongs::Earlier);
+    assert_eq!(judge(5, 505_100, shot(6, 600_000)), Belongs::Here);
 }
 
 #[test]

@@ -243,6 +243,10 @@ impl Camera for V4lCamera {
         self.control_of(&Setting::ExposureUs(0.0)).is_some()
     }
 
+    fn pairs_by_frames_before(&self) -> bool {
+        true
+    }
+
     fn trigger(&mut self, _: u32, _: Micros) -> Result<(), CameraError> {
         Err(CameraError::Trigger { camera: self.kind(), mode: trigger_name(TriggerMode::Software) })
     }

@@ -25,8 +25,8 @@ struct Body {
 }
 
 impl Body {
-    /// `None` without a head or foot joint.
-    fn of(joints: &[Joint]) -> Option<Self> {
+    /// Returns a text about missing joints as the error.
+    fn of(joints: &[Joint]) -> Result<Self, &'static str> {
         let named = |keys: &[&str]| -> Vec<usize> {
             let holds = |joint: &Joint| {
                 let name = joint.name.to_lowercase();
@@ -38,10 +38,15 @@ impl Body {
         let longest = |among: Vec<usize>| {
             among.into_iter().max_by(|&a, &b| length(joints, a).total_cmp(&length(joints, b)))
         };
-        let (head, feet) = (longest(named(&["head"]))?, named(&["foot", "ankle", "toe"]));
+        let head = longest(named(&["head"])).ok_or("no joint is named head")?;
+        let feet = named(&["foot", "ankle", "toe"]);
+        if feet.is_empty() {
+            return Err("no joint is named foot, ankle or toe");
+        }
         let leads_to = |hips: usize, foot: usize| above(joints, foot).any(|joint| joint == hips);
-        let hips = above(joints, head).find(|&hips| feet.iter().all(|&foot| leads_to(hips, foot)))?;
-        (!feet.is_empty()).then_some(Self { hips, head, feet })
+        let hips = above(joints, head).find(|&hips| feet.iter().all(|&foot| leads_to(hips, foot)));
+        let hips = hips.ok_or("no joint is above both head and feet")?;
+        Ok(Self { hips, head, feet })
     }
 
     fn upward(&self, places: &[Point3]) -> Point3 {
@@ -89,8 +94,8 @@ fn length(joints: &[Joint], joint: usize) -> f64 {
 
 pub fn unit(joints: &[Joint]) -> Known<Unit> {
     let (size, what) = match Body::of(joints) {
-        Some(body) => (body.stature(joints), "from head to toe along the bones"),
-        None => (extent(joints), "at its longest, without a joint that is named head or foot"),
+        Ok(body) => (body.stature(joints), "from head to toe along the bones".to_owned()),
+        Err(missing) => (extent(joints), format!("at its longest ({missing})")),
     };
     // A child is likelier than a giant.
     let far = |mm: f64| {
@@ -124,9 +129,12 @@ fn extent(joints: &[Joint]) -> f64 {
 }
 
 pub fn up(motion: &Motion, kinematics: &Kinematics) -> Known<Up> {
-    let Some(body) = Body::of(&motion.joints) else {
-        let reason = "for BVH files mostly have it so, and no joint is named head or foot to tell by".into();
-        return Known { value: Up::Y, source: Source::Guess { reason, sure: false } };
+    let body = match Body::of(&motion.joints) {
+        Ok(body) => body,
+        Err(missing) => {
+            let reason = format!("for BVH files mostly have it so ({missing})");
+            return Known { value: Up::Y, source: Source::Guess { reason, sure: false } };
+        }
     };
     let rest = at_rest(&motion.joints);
     let step = motion.frames.len().div_ceil(FRAMES_ASKED).max(1);
@@ -278,5 +286,18 @@ mod tests {
         assert_eq!(unit(&motion.joints).value.mm, 10.0);
         let found = up(&motion, &Kinematics::new(&motion));
         assert!(found.value == Up::Y && !sure(&found), "{found:?}");
+        // The missing joints are named.
+        for (root, missing) in
+            [("a", "no joint is named head"), ("head", "no joint is named foot, ankle or toe")]
+        {
+            let motion = parse(&text.replace("ROOT a", &format!("ROOT {root}"))).expect("a BVH file");
+            let found = [unit(&motion.joints).source, up(&motion, &Kinematics::new(&motion)).source];
+            for source in found {
+                assert!(
+                    matches!(&source, Source::Guess { reason, .. } if reason.contains(missing)),
+                    "{source:?}"
+                );
+            }
+        }
     }
 }

@@ -31,7 +31,7 @@ impl Raw {
         point.iter().all(|v| v.is_finite()).then_some(point)
     }
 
-    fn in_picture(&self) -> Option<Point3> {
+    pub fn in_picture(&self) -> Option<Point3> {
         let zero = self.x == 0.0 && self.y == 0.0;
         // Not 0, 0, 0, which is a missing marker.
         (!zero && self.x.is_finite() && self.y.is_finite()).then_some([self.x, self.y, 1e-9])
@@ -316,8 +316,8 @@ impl Document {
         let confidences = CONFIDENCES.iter().find_map(|key| map.get(*key)?.as_array());
         let found = POINTS.iter().find_map(|key| {
             let value = map.get(*key)?;
-            // MediaPipe's Python objects keep a list within.
-            let value = value.get("landmark").unwrap_or(value);
+            // MediaPipe's Python objects and ml5.js keep a list within.
+            let value = ["landmark", "keypoints"].iter().find_map(|key| value.get(key)).unwrap_or(value);
             let person = points(value, confidences.map(Vec::as_slice))?;
             Some(if OPENPOSE.contains(key) { person.scored() } else { person })
         })?;

@@ -7,12 +7,15 @@ use serde_json::Value;
 use super::{
     document::{Person, Raw},
     layouts::{Layout, NAMED, NAMES},
+    spatial,
 };
 use crate::{readers::recording::RecordingError, silhouette::aliases};
 
 const KEYS: [&str; 3] = ["name", "part", "id"];
 /// Points of COCO, the usual layout of programs that leave points out.
 const USUAL: usize = 17;
+/// Fewer numbers are not those of a body.
+const LEAST: usize = 6;
 
 struct Order {
     layout: &'static Layout,
@@ -21,7 +24,7 @@ struct Order {
     about: String,
 }
 
-/// Labels of a person's points; empty if they do not tell the points apart.
+/// Labels of a person's points; empty if they do not tell most points apart.
 pub fn labels(points: &[Value]) -> Vec<String> {
     let by = |key: &&str| -> Option<Vec<String>> {
         let label = |point: &Value| match point.get(*key)? {
@@ -29,13 +32,14 @@ pub fn labels(points: &[Value]) -> Vec<String> {
             other => Some(other.as_f64()?.to_string()),
         };
         let labels: Vec<String> = points.iter().map(label).collect::<Option<_>>()?;
-        let is_distinct = labels.iter().collect::<HashSet<_>>().len() == labels.len();
-        is_distinct.then_some(labels)
+        let distinct = labels.iter().collect::<HashSet<_>>().len();
+        (2 * distinct > labels.len()).then_some(labels)
     };
     KEYS.iter().find_map(by).unwrap_or_default()
 }
 
-/// Puts points with labels in the order of a layout, and reports it. Fails if no person remains.
+/// Puts points with labels in the order of a layout, and reports it. Fails if no person remains, or if two points of a
+/// person have one label.
 pub fn order(frames: &mut [Vec<Person>]) -> Result<Option<String>, RecordingError> {
     let labels: BTreeSet<&str> =
         frames.iter().flatten().flat_map(|person| &person.labels).map(String::as_str).collect();
@@ -46,33 +50,57 @@ pub fn order(frames: &mut [Vec<Person>]) -> Result<Option<String>, RecordingErro
     let Some(order) = by_number(&labels, frames).or_else(|| by_name(&labels)) else {
         return by_place(&labels, frames).map(Some);
     };
-    for person in frames.iter_mut().flatten().filter(|person| !person.labels.is_empty()) {
-        let mut raw = vec![Raw::MISSING; order.layout.count];
-        for (label, point) in person.labels.iter().zip(&person.raw) {
-            if let Some(place) = order.places.get(label) {
+    for (number, people) in (1..).zip(frames) {
+        for person in people.iter_mut().filter(|person| !person.labels.is_empty()) {
+            let mut raw = vec![Raw::MISSING; order.layout.count];
+            let mut seen = HashSet::new();
+            for (label, point) in person.labels.iter().zip(&person.raw) {
+                let Some(place) = order.places.get(label) else { continue };
+                if !seen.insert(place) {
+                    return Err(repeated(label, number));
+                }
                 raw[*place] = *point;
             }
+            (person.raw, person.layout) = (raw, order.layout);
         }
-        (person.raw, person.layout) = (raw, order.layout);
     }
     Ok(Some(order.about))
 }
 
-/// The layout of as many points as the numbers reach; COCO for fewer, except if everybody has them all.
+fn repeated(label: &str, frame: usize) -> RecordingError {
+    RecordingError::Kind {
+        kind: "keypoint JSON",
+        reason: format!(
+            "frame {frame} has two points `{label}` of one person, expected each once: rename or remove one"
+        ),
+    }
+}
+
+/// Numbers count from 0 or 1, in the layout of as many points as they reach, or in COCO if they reach less far: that in which
+/// left and right limbs differ least.
 fn by_number(labels: &[String], frames: &[Vec<Person>]) -> Option<Order> {
     let ids: Vec<usize> = labels.iter().map(|label| label.parse().ok()).collect::<Option<_>>()?;
-    let last = *ids.iter().max()?;
+    let (least, last) = (*ids.iter().min()?, *ids.iter().max()?);
     let people = || frames.iter().flatten().filter(|person| !person.labels.is_empty());
-    let most = people().map(|person| person.labels.len()).max()?;
-    // Some programs count from 1.
-    let first = usize::from(ids.iter().min() == Some(&1) && Layout::of(last).is_some());
-    let count = last.checked_add(1)? - first;
-    // Other numbers are not those of keypoints, or run through the file.
-    if 2 * most <= count {
+    // Numbers of which none is repeated run through the file.
+    let points: usize = people().map(|person| person.labels.len()).sum();
+    if least >= USUAL || ids.len() < LEAST || (people().count() > 1 && points == ids.len()) {
         return None;
     }
-    let is_whole = people().all(|person| person.labels.len() == count);
-    let layout = Layout::of(if count < USUAL && !is_whole { USUAL } else { count })?;
+    let reach = last.checked_add(1)?;
+    let candidates = [1_usize, 0].into_iter().filter(|first| *first == 0 || least == 1).flat_map(|first| {
+        let counts = [USUAL, reach - first].into_iter().filter(move |count| reach <= first + count);
+        counts.filter_map(Layout::of).map(move |layout| (first, layout))
+    });
+    let measured = candidates.map(|(first, layout)| {
+        let point = |person: &Person, place: usize| {
+            let is_it = |label: &String| label.parse().is_ok_and(|id: usize| id == place + first);
+            let raw = person.raw.get(person.labels.iter().position(is_it)?)?;
+            raw.in_space().or_else(|| raw.in_picture())
+        };
+        (spatial::asymmetry(people(), layout, point), first, layout)
+    });
+    let (_, first, layout) = measured.min_by(|a, b| a.0.total_cmp(&b.0))?;
     let about = format!(
         "keypoints by their numbers, from {first} up to {last}, in the layout {} (a guess)",
         layout.name

@@ -4,7 +4,7 @@ use super::{
     document::{Person, Raw},
     layouts::{HUMAN36M, Layout, NAMED},
 };
-use crate::readers::recording::RecordingError;
+use crate::{readers::recording::RecordingError, silhouette::capsule::Point3};
 
 /// Confidences exceed 1 slightly in some programs.
 const HIGHEST_CONFIDENCE: f64 = 1.2;
@@ -56,7 +56,8 @@ pub fn layout<'a>(
     let own = people.clone().next().map(|person| person.layout);
     let count = own.map_or(0, |layout| layout.count);
     let orders = [Some(&HUMAN36M), own].into_iter().flatten().filter(|order| order.count == count);
-    let measured = orders.map(|order| (asymmetry(people.clone(), order), order));
+    let in_space = |person: &Person, place: usize| person.raw.get(place)?.in_space();
+    let measured = orders.map(|order| (asymmetry(people.clone(), order, in_space), order));
     let best =
         measured.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(asymmetry, _)| *asymmetry <= MOST_ASYMMETRY);
     best.map(|(_, order)| order).ok_or_else(|| RecordingError::Kind {
@@ -68,14 +69,18 @@ pub fn layout<'a>(
     })
 }
 
-/// Mean difference of left and right limbs relative to their length.
-fn asymmetry<'a>(people: impl Iterator<Item = &'a Person>, order: &Layout) -> f64 {
+/// Mean difference of left and right limbs relative to their length; `point` is that of a person at a place in the order.
+pub fn asymmetry<'a>(
+    people: impl Iterator<Item = &'a Person>,
+    order: &Layout,
+    point: impl Fn(&Person, usize) -> Option<Point3>,
+) -> f64 {
     let place =
         |side: char, joint: char| order.points.iter().position(|short| short.chars().eq([side, joint]));
     let (mut sum, mut count) = (0.0, 0_usize);
     for person in people {
         let length = |side: char, [from, to]: [char; 2]| -> Option<f64> {
-            let at = |joint: char| person.raw.get(place(side, joint)?)?.in_space();
+            let at = |joint: char| point(person, place(side, joint)?);
             let (from, to) = (at(from)?, at(to)?);
             Some((0..3).map(|k| (from[k] - to[k]).powi(2)).sum::<f64>().sqrt())
         };

@@ -9,6 +9,7 @@ use super::{
     document::{Document, Person, Raw},
     found,
     layouts::NAMES,
+    spatial,
 };
 use crate::{
     readers::{
@@ -28,30 +29,32 @@ const PEOPLE: [&str; 4] = ["track", "track_id", "person_id", "skeletonID"];
 struct Column {
     name: String,
     place: [usize; 2],
+    depth: Option<usize>,
     sure: Option<usize>,
 }
 
-/// `None` for a table with a z, or without points.
+/// `None` for a table of points in space, or without points. A z may be the depth of points in a picture, as MediaPipe has it.
 pub fn read(
     columns: &StringRecord,
     rows: &[StringRecord],
     choices: Choices,
 ) -> Result<Option<Found>, RecordingError> {
-    if columns.iter().any(|column| coordinate(column).is_some_and(|(_, axis)| axis == 2)) {
-        return Ok(None);
-    }
+    let has_z = columns.iter().any(|column| coordinate(column).is_some_and(|(_, axis)| axis == 2));
     let is_point = |name: &str| columns.iter().filter_map(coordinate).any(|(own, _)| own == name);
     // One kind counts: some tables have a score and a visibility of each point.
     let kind = columns.iter().filter_map(confidence).find_map(|(name, kind)| is_point(name).then_some(kind));
-    let points: Vec<Column> = markers_of(columns, |column| field(column, kind))?
+    let points: Vec<Column> = markers_of::<4>(columns, |column| field(column, kind))?
         .into_iter()
-        .filter_map(|(name, [x, y, sure])| Some(Column { name, place: [x?, y?], sure }))
+        .filter_map(|(name, [x, y, depth, sure])| Some(Column { name, place: [x?, y?], depth, sure }))
         .collect();
     if points.is_empty() {
         return Ok(None);
     }
     let bodies = bodies(&points);
     let known: usize = bodies.iter().map(|(_, body)| body.len()).sum();
+    if known == 0 && has_z {
+        return Ok(None);
+    }
     if known == 0 {
         let names: Vec<&str> = points.iter().take(6).map(|point| point.name.as_str()).collect();
         let reason = format!(
@@ -76,8 +79,10 @@ pub fn read(
                 let [x, y] = column.place.map(|column| cell(row, column));
                 if let Some([x, y, _]) = point([x, y, "0"], line(row))? {
                     let sure = column.sure.and_then(|column| number(cell(row, column)));
-                    let sure = sure.filter(|sure| sure.is_finite());
-                    raw[*place] = Raw { x, y, third: None, sure };
+                    let third = column.depth.and_then(|column| number(cell(row, column)));
+                    // A column named as a depth holds no confidence.
+                    let sure = sure.filter(|sure| sure.is_finite()).or(has_z.then_some(1.0));
+                    raw[*place] = Raw { x, y, third, sure };
                 }
             }
             let next = ids.len() as i64;
@@ -87,6 +92,9 @@ pub fn read(
         }
         let name = frame.map_or_else(|| index.to_string(), |column| cell(row, column).to_owned());
         frames.push((name, people));
+    }
+    if has_z && spatial::has_depth(frames.iter().flat_map(|(_, people)| people)) {
+        return Ok(None);
     }
     if frames.is_empty() {
         return Err(RecordingError::Kind { kind: "CSV", reason: "it has no row below its header".into() });
@@ -134,7 +142,7 @@ fn confidence(column: &str) -> Option<(&str, &'static str)> {
     Some((name, kind))
 }
 
-/// Name of a point, and 0 for x, 1 for y, 2 for the confidence of this kind.
+/// Name of a point, and 0 for x, 1 for y, 2 for z, 3 for the confidence of this kind.
 fn field<'a>(column: &'a str, kind: Option<&str>) -> Option<(&'a str, usize)> {
     let mocapnet = MOCAPNET.iter().enumerate().find_map(|(axis, start)| {
         let (begin, name) = column.split_at_checked(start.len())?;
@@ -142,7 +150,7 @@ fn field<'a>(column: &'a str, kind: Option<&str>) -> Option<(&'a str, usize)> {
     });
     let sure = || {
         let (name, own) = confidence(column)?;
-        (Some(own) == kind).then_some((name, 2))
+        (Some(own) == kind).then_some((name, 3))
     };
     mocapnet.or_else(|| coordinate(column)).or_else(sure)
 }
@@ -276,6 +284,19 @@ mod tests {
         let mouse = text.replace("_shoulder", "_paw").replace("_hip", "_whisker").replace("_knee", "_toe");
         let error = read(&mouse.replace("_wrist", "_claw"), None).expect_err("a mouse").to_string();
         assert!(error.contains("nose, left_paw") && error.contains("rename the columns"), "{error}");
+    }
+
+    #[test]
+    fn a_depth_next_to_parts_of_the_picture_is_no_height_and_metres_remain_metres() {
+        let header = cells(|name, _| format!("{name}_x,{name}_y,{name}_z"));
+        for depth in ["0.4", "-0.2", ""] {
+            let row = cells(|_, [x, y]| format!("{},{},{depth}", x / 320.0, y / 200.0));
+            expect_person(&format!("frame{header}\n0{row}\n1{row}\n"), 2);
+        }
+        // A person in metres with z up, who stays within a square metre.
+        let row = cells(|_, [x, y]| format!("{},0.3,{}", x / 200.0, (190.0 - y) / 100.0));
+        let found = read(&format!("frame{header}\n0{row}\n"), None).expect("markers");
+        assert!(!found.planar && (found.by_name(0)["nose"][2] - 1600.0).abs() < 1e-6);
     }
 
     #[test]

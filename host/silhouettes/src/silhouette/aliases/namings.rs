@@ -7,7 +7,7 @@ pub struct Naming {
     pub names: &'static [(&'static str, &'static str)],
 }
 
-pub const NAMINGS: [Naming; 8] = [
+pub const NAMINGS: [Naming; 9] = [
     Naming {
         about: "joints named as Biovision and SMPL do",
         template: "bvh",
@@ -240,6 +240,33 @@ pub const NAMINGS: [Naming; 8] = [
             ("@hip", "# hip"),
             ("@knee", "# knee"),
             ("@foot", "# ankle"),
+        ],
+    },
+    Naming {
+        about: "laboratory markers named as Helen Hayes sets and OpenSim's gait2392 do",
+        template: "keypoints",
+        names: &[
+            ("tophead", "head top"),
+            ("fronthead", "nose"),
+            ("sternum", "neck"),
+            ("c7", "neck"),
+            ("vsacral", "hip centre"),
+            ("sacral", "hip centre"),
+            ("@shoulder", "# shoulder"),
+            ("@acromium", "# shoulder"),
+            ("@elbow", "# elbow"),
+            ("@elbowlat", "# elbow"),
+            ("@wrist", "# wrist"),
+            ("@wristlat", "# wrist"),
+            ("@asis", "# hip"),
+            ("@knee", "# knee"),
+            ("@kneelat", "# knee"),
+            ("@ankle", "# ankle"),
+            ("@anklelat", "# ankle"),
+            ("@heel", "# heel"),
+            ("@toe", "# big toe"),
+            ("@toetip", "# big toe"),
+            ("@toelat", "# small toe"),
         ],
     },
     Naming {

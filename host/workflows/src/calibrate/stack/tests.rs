@@ -16,6 +16,8 @@ fn uneven_positions_are_refused_by_the_slices_between_which_they_are() {
     assert!((even_step(&[5.0, 4.0, 3.02, 2.0], &request).unwrap() - 1.0).abs() < 1e-12);
     let error = even_step(&[0.0, 1.0, 2.0, 3.5], &request).unwrap_err().to_string();
     assert!(error.contains("slices 3 and 4 are 1.5"), "{error}");
+    let microscope = even_step(&[0.0, 2e-5, 4e-5, 8e-5], &request).unwrap_err().to_string();
+    assert!(microscope.contains("slices 3 and 4 are 0.00004 apart, 0.00002 is usual"), "{microscope}");
     let standing = even_step(&[1.0, 1.0, 2.0], &request).unwrap_err().to_string();
     assert!(standing.contains("slices 1 and 2 are 0"), "{standing}");
 }
@@ -47,7 +49,7 @@ fn single_pixels_without_a_value_are_filled_and_rows_are_refused() {
         std::fs::write(&path, farnear_files::map::tiff(slice.view()).unwrap()).unwrap();
         read(std::slice::from_ref(&path), &CalibrateStackRequest::default(), &Context::unattended())
     };
-    assert_eq!(read_with(&[(4, 4), (6, 2)]).unwrap().0, [Array2::from_elem((9, 9), 0.5_f32)]);
+    assert_eq!(read_with(&[(4, 4), (6, 2), (0, 0)]).unwrap().0, [Array2::from_elem((9, 9), 0.5_f32)]);
     let row: Vec<(usize, usize)> = (0..9).map(|x| (0, x)).collect();
     let error = read_with(&row).unwrap_err().to_string();
     assert!(error.contains("1.tif") && error.contains("9 have none"), "{error}");

@@ -1,6 +1,7 @@
 //! Shaken or defocused frames are less sharp than both neighbours. The first and the last frame are compared with what the next
 //! three suggest: blur grows evenly with the distance from the focus, so a power of the sharpness (which one depends on the
 //! texture) is a parabola of the position. A block that is sharpest in the next frame tells nothing: its peak may lie between.
+//! Noise looks sharp in dark frames, so a frame is compared with those of about its own brightness only.
 
 /// Part of the sharpness of the less sharp neighbour below which a block is shaken, and part of the blocks that must be.
 const SHAKEN: f64 = 0.9;
@@ -13,6 +14,8 @@ const SHARP_BLOCKS: f64 = 0.1;
 /// Powers of the squared gradient for textures from coarse to fine, and the least blur, as part of that of the next frames.
 const POWERS: [f64; 3] = [-1.0, -0.5, -0.25];
 const LEAST_BLUR: f64 = 0.7;
+/// Largest ratio of the brightness of frames that are compared; exposures of a series differ by 2 or more.
+const ALIKE: f64 = 1.9;
 /// Fewest frames of which one may be left out.
 const LEAST_FRAMES: usize = 5;
 
@@ -23,37 +26,48 @@ pub(super) struct Shaken {
     pub untold: Vec<usize>,
 }
 
-pub(super) fn find(sharpness: &[Vec<f64>], positions: &[f64], members: &[usize]) -> Shaken {
-    let mut found = Shaken { frames: inside(sharpness, members), untold: Vec::new() };
+/// From the sharpness by blocks, the position and the brightness of each frame.
+pub(super) fn find(sharpness: &[Vec<f64>], positions: &[f64], gains: &[f64], members: &[usize]) -> Shaken {
+    let mut found = Shaken { frames: inside(sharpness, gains, members), untold: Vec::new() };
     if members.iter().any(|index| sharpness[*index].is_empty()) {
         return found;
     }
     let kept: Vec<usize> = members.iter().copied().filter(|index| !found.frames.contains(index)).collect();
     let judge = |frames: &[usize]| dull_end(sharpness, positions, frames);
-    for frames in [kept.clone(), kept.iter().rev().copied().collect()] {
-        let Some(end) = frames.first() else { continue };
+    for mut frames in [kept.clone(), kept.iter().rev().copied().collect()] {
+        let Some(&end) = frames.first() else { continue };
+        frames.retain(|other| alike(gains, end, *other));
         // If the next frames are not as expected either, this stack is of another kind.
         let of_another_kind =
             || (1..frames.len() - LEAST_FRAMES + 1).any(|first| judge(&frames[first..]) == Some(true));
         match judge(&frames) {
             Some(false) => {}
-            Some(true) if !of_another_kind() => found.frames.push(*end),
-            _ => found.untold.push(*end),
+            Some(true) if !of_another_kind() => found.frames.push(end),
+            _ => found.untold.push(end),
         }
     }
     found
 }
 
-fn inside(sharpness: &[Vec<f64>], members: &[usize]) -> Vec<usize> {
-    let three = members.array_windows().filter(|indices: &&[usize; 3]| {
-        let [before, own, after] = indices.map(|index| &sharpness[index]);
-        let blocks = own.iter().zip(before.iter().zip(after));
+fn alike(gains: &[f64], one: usize, other: usize) -> bool {
+    gains[one].max(gains[other]) <= ALIKE * gains[one].min(gains[other])
+}
+
+fn inside(sharpness: &[Vec<f64>], gains: &[f64], members: &[usize]) -> Vec<usize> {
+    let is_dull = |at: &usize| {
+        let own = members[*at];
+        let is_alike = |other: &&usize| alike(gains, own, **other);
+        let before = members[..*at].iter().rev().find(is_alike);
+        let after = members[at + 1..].iter().find(is_alike);
+        let (Some(before), Some(after)) = (before, after) else { return false };
+        let neighbours = sharpness[*before].iter().zip(&sharpness[*after]);
+        let blocks = sharpness[own].iter().zip(neighbours);
         let dull =
             blocks.clone().filter(|(own, (before, after))| **own < SHAKEN * before.min(**after)).count();
         // A frame with pixels without a value has no sharpness.
         blocks.len() > 0 && dull as f64 >= SHAKEN_BLOCKS * blocks.len() as f64
-    });
-    three.map(|[_, own, _]| *own).collect()
+    };
+    (0..members.len()).filter(is_dull).map(|at| members[at]).collect()
 }
 
 /// Whether the first of these frames is duller than the next ones suggest, in most of the blocks that tell it. `None` if too few
@@ -114,6 +128,8 @@ fn expectation(
 mod tests {
     use super::*;
 
+    const EVEN: [f64; 12] = [1.0; 12];
+
     /// Blocks at depths from `depths.0` to `depths.1`, as sharp as blur that grows by `slope` px per position makes them.
     fn curves(positions: &[f64], depths: (f64, f64), slope: f64, power: i32) -> Vec<Vec<f64>> {
         let block = |position: f64, block: usize| {
@@ -132,12 +148,12 @@ mod tests {
                         (0..12).map(|index| f64::from(index) + uneven * f64::from(index % 2)).collect();
                     let members: Vec<usize> = (0..12).collect();
                     let good = curves(&positions, depths, slope, power);
-                    let found = find(&good, &positions, &members);
+                    let found = find(&good, &positions, &EVEN, &members);
                     assert_eq!(found, Shaken::default(), "{slope} {power} {depths:?}");
                     for at in [0, 11] {
                         let mut bad = good.clone();
                         bad[at].iter_mut().for_each(|value| *value *= 0.6);
-                        let found = find(&bad, &positions, &members);
+                        let found = find(&bad, &positions, &EVEN, &members);
                         // Steps of twice the depth of field tell less, and a frame that is sharpest somewhere stays.
                         let tells_less = slope == 2.0 || (depths.0..depths.1).contains(&positions[at]);
                         let untold = tells_less && found.frames.is_empty() && found.untold == [at];
@@ -149,6 +165,19 @@ mod tests {
     }
 
     #[test]
+    fn noise_of_darker_frames_condemns_no_other() {
+        let positions: Vec<f64> = (0..12).map(f64::from).collect();
+        let members: Vec<usize> = (0..12).collect();
+        let gains: Vec<f64> = members.iter().map(|frame| [1.0, 0.3][frame % 2]).collect();
+        let mut noisy = curves(&positions, (2.0, 8.0), 0.5, 1);
+        noisy.iter_mut().skip(1).step_by(2).flatten().for_each(|value| *value += 0.2);
+        assert!(!find(&noisy, &positions, &EVEN, &members).frames.is_empty(), "the noise must matter");
+        assert_eq!(find(&noisy, &positions, &gains, &members), Shaken::default());
+        noisy[4].iter_mut().for_each(|value| *value *= 0.2);
+        assert_eq!(find(&noisy, &positions, &gains, &members).frames, [4]);
+    }
+
+    #[test]
     fn a_dull_frame_next_but_one_to_an_end_does_not_condemn_the_end() {
         let positions: Vec<f64> = (0..7).map(f64::from).collect();
         let members: Vec<usize> = (0..7).collect();
@@ -157,7 +186,7 @@ mod tests {
             for at in [2, 4] {
                 let mut bad = good.clone();
                 bad[at].iter_mut().for_each(|value| *value *= 0.3);
-                let found = find(&bad, &positions, &members);
+                let found = find(&bad, &positions, &EVEN, &members);
                 assert!(!found.frames.iter().any(|frame| [0, 6].contains(frame)), "{slope} {at}: {found:?}");
             }
         }
@@ -170,12 +199,12 @@ mod tests {
         let members: Vec<usize> = (0..7).collect();
         let mut sharpness = curves(&positions, (3.5, 5.5), 0.5, 2);
         sharpness[0].iter_mut().for_each(|value| *value *= 0.5);
-        assert_eq!(find(&sharpness, &positions, &members).frames, [0]);
+        assert_eq!(find(&sharpness, &positions, &EVEN, &members).frames, [0]);
         let near = sharpness[0].len() / 8;
         for (frame, row) in sharpness.iter_mut().enumerate() {
             row[..near].iter_mut().for_each(|value| *value = 1.0 / (1 + frame) as f64);
         }
-        assert_eq!(find(&sharpness, &positions, &members), Shaken { frames: vec![], untold: vec![0] });
+        assert_eq!(find(&sharpness, &positions, &EVEN, &members), Shaken { frames: vec![], untold: vec![0] });
     }
 
     #[test]
@@ -183,7 +212,7 @@ mod tests {
         let positions: Vec<f64> = (0..8).map(f64::from).collect();
         let members: Vec<usize> = (0..8).collect();
         let focused = curves(&positions, (0.6, 1.4), 1.0, 2);
-        assert_eq!(find(&focused, &positions, &members).untold, [0]);
-        assert_eq!(find(&focused, &positions, &members[..4]).untold, [0, 3]);
+        assert_eq!(find(&focused, &positions, &EVEN, &members).untold, [0]);
+        assert_eq!(find(&focused, &positions, &EVEN, &members[..4]).untold, [0, 3]);
     }
 }

@@ -107,6 +107,25 @@ fn warns_of_a_stack_that_moves_far() {
     }
 }
 
+/// As from a hand: also registered, neighbours have little in common.
+#[test]
+fn warns_of_a_noisy_stack_that_moves_far() {
+    let positions: Vec<f64> = (0..COUNT).map(|index| index as f64).collect();
+    let moved = |(index, image): (usize, &Array2<f32>)| {
+        let noise = scene(100 + index as u64);
+        Array2::from_shape_fn(image.dim(), |(y, x)| {
+            image[(y, (x + 96 - 6 * index) % 96)] + 0.35 * (noise[(y, x)] - 0.5)
+        })
+    };
+    let images: Vec<Array2<f32>> = stack().iter().enumerate().map(moved).collect();
+    let aligned = checked(&images, &positions, Some(Model::Similarity));
+    assert!(aligned.usual.unwrap() < TELLING, "{:?}", aligned.usual);
+    let drift_px = checked(&images, &positions, None).drift_px;
+    assert!((drift_px - 30.0).abs() < 4.0, "{drift_px}");
+    let unrelated: Vec<Array2<f32>> = (0..7).map(|seed| mean(&scene(seed), 3)).collect();
+    assert_eq!(checked(&unrelated, &positions[..7], None).drift_px, 0.0);
+}
+
 #[test]
 fn finds_a_foreign_or_turned_frame_at_any_place() {
     for at in [0, 1, 4, COUNT / 2, COUNT - 2, COUNT - 1] {
@@ -299,6 +318,30 @@ fn flicker_costs_nothing() {
     let (found, known, _) = error(&prepared.images, Vec::new());
     assert!(untreated > 1.1 * clean, "{untreated} {clean}: the factors must matter");
     assert!(found < 1.05 * clean && known > 0.98, "{found} {clean} {known}");
+}
+
+/// A bright image, exposures that alternate and a lamp that grows, under the same noise.
+#[test]
+fn exposures_of_any_factor_cost_nothing() {
+    let good = true_stack(&even_positions());
+    let (clean, ..) = error(&good, Vec::new());
+    let exposures: [fn(usize) -> f32; 3] = [
+        |index| if index == 7 { 2.5 } else { 1.0 },
+        |index| [1.0, 0.3][index % 2],
+        |index| 10.0_f32.powf(index as f32 / 14.0) / 3.0,
+    ];
+    for (number, exposure) in exposures.iter().enumerate() {
+        let exposed = |(index, image): (usize, &Array2<f32>)| {
+            let noise = scene(200 + index as u64);
+            Array2::from_shape_fn(image.dim(), |at| exposure(index) * image[at] + 0.03 * (noise[at] - 0.5))
+        };
+        let images: Vec<Array2<f32>> = good.iter().enumerate().map(exposed).collect();
+        let context = Context::unattended();
+        let prepared = super::super::prepare_stack(images, even_positions(), None, false, &context).unwrap();
+        assert_eq!(prepared.left_out, [0; 0], "{number}: {:?}", prepared.warnings);
+        let (found, known, _) = error(&prepared.images, Vec::new());
+        assert!(found < 1.05 * clean && known > 0.98, "{number}: {found} {clean} {known}");
+    }
 }
 
 #[test]

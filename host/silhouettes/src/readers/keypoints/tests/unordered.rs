@@ -181,3 +181,80 @@ fn the_place_of_a_persons_box_is_not_a_point() {
     let points = lists(&person(layout(17), 100.0));
     upright(&format!(r#"{{"people":[{{"id":3,"x":10,"y":20,"keypoints":{points}}}]}}"#), 1);
 }
+
+/// Numbers from 0, numbers from 1, and names.
+const LABELS: [fn(usize) -> String; 3] =
+    [|n| format!(r#""id":{n}"#), |n| format!(r#""id":{}"#, n + 1), |n| format!(r#""name":"{}""#, COCO[n])];
+
+#[test]
+fn a_label_twice_is_refused_with_its_frame() {
+    let whole: Vec<usize> = (0..17).collect();
+    let once_more: Vec<usize> = (0..17).chain([5]).collect();
+    for (label, refused) in LABELS.into_iter().zip(["5", "6", "left_shoulder"]) {
+        let expected = |frame: usize| format!("frame {frame} has two points `{refused}` of one person");
+        // The fourth point has the label of the sixth.
+        let wrong = frames(std::slice::from_ref(&whole), |n| label(if n == 3 { 5 } else { n }));
+        let error = read(wrong.as_bytes(), "json", Choices::default()).expect_err("twice").to_string();
+        assert!(error.contains(&expected(1)), "{error}");
+        let more = frames(&[whole.clone(), once_more.clone()], label);
+        let error = read(more.as_bytes(), "json", Choices::default()).expect_err("twice").to_string();
+        assert!(error.contains(&expected(2)), "{error}");
+    }
+}
+
+#[test]
+fn ankles_that_no_frame_shows_are_reported_and_the_other_points_stay_in_place() {
+    for label in LABELS {
+        let json = frames(&[(0..15).collect(), (0..15).collect()], label);
+        let found = read(json.as_bytes(), "json", Choices::default()).expect("keypoints");
+        let points = found.by_name(0);
+        let height = points["left shoulder"][2] - points["left knee"][2];
+        assert!((height - 920.0).abs() < 1.0 && !points.contains_key("left ankle"), "{height}");
+        let remarks = found.remarks().join("; ");
+        assert!(remarks.contains("no frame shows left ankle, right ankle"), "{remarks}");
+    }
+    let whole = upright(&frames(&[(0..17).collect()], LABELS[2]), 1);
+    assert!(whole.remarks().iter().all(|remark| !remark.contains("no frame shows")), "{:?}", whole.remarks());
+}
+
+#[test]
+fn numbers_of_another_layout_are_distinguished_from_coco_without_ankles_by_equal_limbs() {
+    for count in [15, 16] {
+        let point = |(n, [x, y, _]): (usize, &[f64; 3])| format!(r#"{{"id":{n},"x":{x},"y":{y}}}"#);
+        let points: Vec<String> = person(layout(count), 100.0).iter().enumerate().map(point).collect();
+        let found = upright(&format!(r#"[{{"keypoints":[{}]}}]"#, points.join(",")), 1);
+        let remarks = found.remarks().join("; ");
+        assert!(remarks.contains(layout(count).name), "{remarks}");
+    }
+}
+
+#[test]
+fn seven_points_of_a_person_are_enough() {
+    let seven = vec![0, 5, 6, 11, 12, 13, 15];
+    for label in [LABELS[0], LABELS[2]] {
+        upright(&frames(std::slice::from_ref(&seven), label), 1);
+        upright(&frames(&[seven.clone(), seven.clone()], label), 2);
+    }
+}
+
+#[test]
+fn poses_of_ml5_are_read_by_the_names_of_their_points() {
+    let camel = |name: &str| -> String {
+        let mut words = name.split('_');
+        let first = words.next().unwrap_or_default().to_owned();
+        words.fold(first, |all, word| all + &word[..1].to_uppercase() + &word[1..])
+    };
+    let point = |(name, [x, y, c]): (&&str, [f64; 3])| {
+        format!(r#"{{"score":{c},"part":"{}","position":{{"x":{x},"y":{y}}}}}"#, camel(name))
+    };
+    let mut points: Vec<String> = COCO.iter().zip(person(layout(17), 100.0)).map(point).collect();
+    points.reverse();
+    let bone = format!("[[{},{}]]", points[0], points[2]);
+    let pose = format!(
+        r#"{{"pose":{{"score":0.9,"keypoints":[{}],"nose":{{"x":1,"y":2}}}},"skeleton":{bone}}}"#,
+        points.join(",")
+    );
+    upright(&pose, 1);
+    upright(&format!("[{pose},{pose}]"), 2);
+    upright(&format!("[[{pose}],[]]"), 2);
+}
