@@ -203,9 +203,10 @@ pub fn focus_stack<'py>(
     let code_step = full_scale.map_or(0.0, f32::recip);
     let (map, depth, prepared) = work::interruptibly(py, |stop| -> PyResult<_> {
         let context = Context::new(&Unattended, &Unattended, Cancel::from(Arc::clone(stop)));
-        let prepared = prepare_stack(images, positions, model, use_all, &context).map_err(wrong)?;
+        let prepared =
+            prepare_stack(images, code_step, positions, model, use_all, &context).map_err(wrong)?;
         let views: Vec<ArrayView2<'_, f32>> = prepared.images.iter().map(|image| image.view()).collect();
-        let stack = Stoppable { views, code_step, stop };
+        let stack = Stoppable { views, code_step: prepared.code_step, stop };
         let mut map = depth_from_positions(&stack, &prepared.positions, &settings)
             .map_err(|Stopped(error)| error.map_or_else(|| PyKeyboardInterrupt::new_err(()), wrong))?;
         prepared.withhold(&mut map);

@@ -107,7 +107,7 @@ pub trait Camera {
         false
     }
 
-    /// Whether a frame is assigned to its exposure by the frames before it, and not by a trigger number in it.
+    /// Whether the frames before a frame tell that one between them is missing.
     fn pairs_by_frames_before(&self) -> bool {
         false
     }

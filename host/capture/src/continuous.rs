@@ -81,8 +81,8 @@ pub struct Continuous<'c> {
 }
 
 impl<'c> Continuous<'c> {
-    /// Arms camera and board and starts. Waits for each image at most `image_wait`. A camera whose frames have no trigger
-    /// number takes one image before the run.
+    /// Arms camera and board and starts. Waits for each image at most `image_wait`. A camera that pairs by
+    /// the frames before ([`Camera::pairs_by_frames_before`]) takes one image before the run.
     pub fn start(
         client: &Client,
         camera: &'c mut dyn Camera,
@@ -96,7 +96,14 @@ impl<'c> Continuous<'c> {
         camera.arm(mode, exposure)?;
         // The first frame of the run has a frame before it, too: losing it would shift all.
         if let Some(first) = shots.first().filter(|_| camera.pairs_by_frames_before()) {
-            expose_first(client, camera, *first, image_wait)?;
+            let mut left = UNDELIVERED_MAX;
+            // An incomplete frame has come, so that the next one is not shifted.
+            while let Err(error) = expose_first(client, camera, *first, image_wait) {
+                left -= 1;
+                if left == 0 || !matches!(error, CaptureError::Camera(CameraError::Incomplete { .. })) {
+                    return Err(error);
+                }
+            }
             client.arm(shots)?;
         }
         let work = Some(client.start_continuous(shots, pace.period, pace.exposures)?);

@@ -13,6 +13,7 @@ mod bank;
 mod holes;
 mod rows;
 mod scales;
+mod slopes;
 mod whitened;
 
 use std::fmt;
@@ -164,7 +165,7 @@ struct Maps<'a> {
 }
 
 fn estimate_into(
-    depth_mm: Option<&mut Array2<f32>>,
+    mut depth_mm: Option<&mut Array2<f32>>,
     far: ArrayView2<f32>,
     near: ArrayView2<f32>,
     bank: &Bank,
@@ -184,7 +185,7 @@ fn estimate_into(
     let mut maps = [(); 2].map(|()| Array2::<f32>::zeros(size));
     let rows = rows::rows(size);
     let [deviation, misfit] = &mut maps;
-    let of_depth: Vec<Option<ArrayViewMut2<'_, f32>>> = match depth_mm {
+    let of_depth: Vec<Option<ArrayViewMut2<'_, f32>>> = match &mut depth_mm {
         Some(depth_mm) => depth_mm.axis_chunks_iter_mut(Axis(0), rows).map(Some).collect(),
         None => (0..size.0.div_ceil(rows)).map(|_| None).collect(),
     };
@@ -203,6 +204,11 @@ fn estimate_into(
         .collect();
     let [left, noise, texture] =
         of_bands.into_iter().fold([0.0; 3], |a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2]]);
+    if let (Some(depth_mm), Some(_)) = (depth_mm, optics.stage()) {
+        // Other lenses have smaller windows.
+        let half = if let Window::Fixed(side) = settings.window { side } else { LEARNED_PX[2] } / 2;
+        slopes::straighten(depth_mm, &mut maps[0], half, bank.reach_px());
+    }
     let left_over = if texture > 0.0 { (left - noise) / texture } else { f64::NAN };
     let excess = if noise > 0.0 { left / noise } else { f64::NAN };
     let noise_part = if texture > 0.0 { noise / texture } else { 0.0 };

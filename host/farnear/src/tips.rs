@@ -60,14 +60,17 @@ fn one_of_several(command: &Command, word: &str) -> Option<String> {
         .then(|| format!("give the folder of the pictures: {}", folder.display()))
 }
 
-/// For a file, and a command that takes files by options only.
+/// For a file, and a command that takes one by a single option only.
 fn without_option(command: &Command, word: &str) -> Option<String> {
-    let is_file = !word.starts_with('-') && Path::new(word).extension().is_some();
+    let is_number = word.parse::<f64>().is_ok();
+    let is_file = !is_number && !word.starts_with('-') && Path::new(word).extension().is_some();
     let is_input = |option: &&Arg| {
         let values = option.get_value_names().unwrap_or_default();
         option.get_long() != Some("out") && values.iter().any(|name| name.as_str() == "FILE")
     };
-    let option = command.get_arguments().find(is_input)?.get_long()?;
+    let mut inputs = command.get_arguments().filter(is_input);
+    let (Some(option), None) = (inputs.next(), inputs.next()) else { return None };
+    let option = option.get_long()?;
     let only_by_option = is_file && command.get_positionals().next().is_none();
     only_by_option.then(|| format!("a file is given by an option: --{option} {word}"))
 }

@@ -13,7 +13,7 @@ const USUAL_DIGITS: f64 = 3.0;
 /// for each digit before it above three.
 pub fn rounded_for(size: f64, value: f64, decimals: i32) -> f64 {
     let zeros = (-size.abs().log10()).ceil() - 1.0;
-    let more = zeros.clamp(0.0, MOST_ZEROS) as i32;
+    let more = if size == 0.0 { 0 } else { zeros.clamp(0.0, MOST_ZEROS) as i32 };
     let fewer = (-zeros - USUAL_DIGITS).clamp(0.0, MOST_ZEROS) as i32;
     rounded(value, (decimals + more - fewer).max(0))
 }
@@ -36,6 +36,7 @@ mod tests {
 
     #[test]
     fn large_sizes_have_no_digits_of_noise() {
+        assert_eq!(rounded_for(0.0, f64::from(123.4_f32), 3), 123.4);
         assert_eq!(rounded_for(999.0, 111.398_636, 3), 111.399);
         assert_eq!(rounded_for(1001.0, 4_617.839_171, 3), 4_617.84);
         assert_eq!(rounded_for(4e6, 4_617_839.171, 3), 4_617_839.0);

@@ -252,6 +252,7 @@ impl Pairing {
                 // A camera does not count a trigger that it missed; a continuous run continues after it.
                 let limit = JITTER + drift;
                 let missed = ahead < 0
+                    && drift < JITTER
                     && off.is_some_and(|off| off <= limit)
                     && by_board / triggers.max(1) > 2 * limit;
                 if ahead != 0 && !missed {

@@ -181,8 +181,8 @@ impl Camera for SimCamera {
     }
 
     fn arm(&mut self, mode: TriggerMode, exposure: Micros) -> Result<(), CameraError> {
-        // Numbers of images from before a reset of the board may come again. Other old images are recognised later by
-        // trigger number or time.
+        // After a reset of the board its number would be a later one. Old images in the queue are recognised by trigger number or
+        // time.
         (self.early, self.passed) = (None, None);
         let free = mode == TriggerMode::FreeRunning;
         if free {

@@ -223,6 +223,31 @@ fn a_curved_surface_is_measured_honestly_by_a_lens_learned_on_a_flat_one() {
     assert!(judged.within_three > 0.97 && judged.scatter < 1.3 && judged.fill > 0.95, "{judged:?}");
 }
 
+/// Without a correction, windows of 41 px that are cut by the border are off by 2.5 deviations.
+#[test]
+fn a_slope_reaches_to_the_border() {
+    let lens = lens(0.0, 0.0);
+    let found = calibrated(&lens).unwrap();
+    let step = found.optics.stage().unwrap().pair_step;
+    let plane = Plane([4.0 + 0.5 * step as f64, 0.7 * step as f64, 0.0]);
+    let cells = random_texture(true, SIZE[0], SIZE[1], CONTRAST, 50);
+    let pair = [4, 4 + step].map(|index| slice(&lens, &cells, &|y, x| plane.at(y, x), index, 60));
+    let settings = MeasureSettings { window: Window::Adaptive, ..MeasureSettings::default() };
+    let map = measure_pair(pair, &found.optics, DepthMethod::Whitened, None, &settings).unwrap();
+    let middle = map.map.depth_mm[(SIZE[1] / 2, SIZE[0] / 2)];
+    for columns in [4..12, SIZE[0] - 12..SIZE[0] - 4] {
+        let (mut within, mut all) = (0, 0);
+        for (y, x) in (20..SIZE[1] - 20).flat_map(|y| columns.clone().map(move |x| (y, x))) {
+            let nearer_mm = STEP_MM * (plane.at(y, x) - plane.0[0]);
+            let error = f64::from(map.map.depth_mm[(y, x)] - middle) + nearer_mm;
+            within += usize::from(error.abs() <= 3.0 * f64::from(map.validity.deviation_mm[(y, x)]));
+            all += 1;
+        }
+        println!("{columns:?}: {within} of {all}");
+        assert!(within as f64 > 0.97 * f64::from(all), "{columns:?}: {within} of {all}");
+    }
+}
+
 /// Steps of the target are equal in depth, also where the range is large against the distance.
 #[test]
 fn a_near_target_is_measured_in_the_steps_of_the_stage() {

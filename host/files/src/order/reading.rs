@@ -99,9 +99,7 @@ pub fn ambiguity(sorted: &[PathBuf]) -> Option<String> {
             true => "are counts, write them without separators of thousands",
             false => "are decimals, write all with as many decimals",
         };
-        return Some(format!(
-            "{name} counts as number {value}, which makes the steps most even: if the numbers {otherwise}"
-        ));
+        return Some(format!("{name} counts as number {value}: if the numbers {otherwise}"));
     }
     may_be_grid(&numbers).then(|| {
         format!(
@@ -113,7 +111,7 @@ pub fn ambiguity(sorted: &[PathBuf]) -> Option<String> {
     })
 }
 
-/// Two files whose names differ only in how a number is written: `z1` and `z01`, `z1,5` and `z1.50`.
+/// Two files whose names differ only in how a number is written: `z1` and `z01`, `z1` and `z1.0`.
 pub fn same_number(paths: &[PathBuf]) -> Option<[&PathBuf; 2]> {
     let (names, values) = read(paths);
     let decimal = values.map(|values| values.column);
@@ -161,9 +159,9 @@ mod tests {
     #[test]
     fn thousands_and_decimals_are_told_by_even_steps_and_the_reading_is_stated() {
         for (names, expected) in [
-            (&["900.tif", "950.tif", "1,000.tif", "1,050.tif"][..], "1,000.tif counts as number 1000,"),
-            (&["z998.tif", "z999.tif", "z1.001.tif", "z1.003.tif"], "z1.001.tif counts as number 1001,"),
-            (&["z1.tif", "z1,125.tif", "z2.tif"], "z1,125.tif counts as number 1.125,"),
+            (&["900.tif", "950.tif", "1,000.tif", "1,050.tif"][..], "1,000.tif counts as number 1000:"),
+            (&["z998.tif", "z999.tif", "z1.001.tif", "z1.003.tif"], "z1.001.tif counts as number 1001:"),
+            (&["z1.tif", "z1,125.tif", "z2.tif"], "z1,125.tif counts as number 1.125:"),
         ] {
             let mut reversed = names.to_vec();
             reversed.reverse();
@@ -196,7 +194,11 @@ mod tests {
 
     #[test]
     fn a_number_that_is_written_twice_is_found() {
-        for names in [["z01.tif", "z1.tif", "z2.tif"], ["z1,0.tif", "z1.0.tif", "z2.0.tif"]] {
+        for names in [
+            ["z01.tif", "z1.tif", "z2.tif"],
+            ["z1.tif", "z1.0.tif", "z2.0.tif"],
+            ["z1,0.tif", "z1.0.tif", "z2.0.tif"],
+        ] {
             assert!(same_number(&sorted(&names)).is_some(), "{names:?}");
         }
         for names in [

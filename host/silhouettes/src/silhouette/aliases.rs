@@ -60,7 +60,9 @@ pub fn keypoints(names: &[String]) -> Vec<(usize, String)> {
     let all = namings.map(|naming| matched(&simple, &template, Some(naming)));
     let best = all.rev().max_by_key(Vec::len).unwrap_or_default();
     let known: Vec<String> = best.iter().map(|(_, name)| name.clone()).collect();
-    let are_most = best.len() >= LEAST && 5 * best.len() >= 4 * names.len();
+    // Animals have a nose, shoulders and hips, too.
+    let has_limb = known.iter().any(|name| name.ends_with("elbow") || name.ends_with("knee"));
+    let are_most = has_limb && best.len() >= LEAST && 5 * best.len() >= 4 * names.len();
     if are_most || template.check(&known).is_ok() { best } else { Vec::new() }
 }
 
@@ -104,22 +106,29 @@ fn matched(simple: &[String], template: &Template, naming: Option<&Naming>) -> V
 
 /// Names simplified, without the text up to `_` that all begin with, such as a rig's.
 fn all_simplified(names: &[String]) -> Vec<String> {
-    let first = names.first().filter(|_| names.len() > 1).map_or("", String::as_str);
+    let first = names.first().filter(|_| names.len() > 1).map_or("", |name| without_subject(name));
     let ends = first.match_indices('_').map(|(at, _)| at + 1);
-    let is_shared = |end: &usize| names.iter().all(|name| name.starts_with(&first[..*end]));
+    let is_shared = |end: &usize| names.iter().all(|name| without_subject(name).starts_with(&first[..*end]));
     let shared = simplified(&first[..ends.take_while(is_shared).last().unwrap_or(0)]);
+    let is_side = ["left", "right", "l", "r"].contains(&shared.as_str());
     let own = |name: &String| {
         let simple = simplified(name);
-        simple.strip_prefix(&shared).unwrap_or(&simple).to_owned()
+        simple.strip_prefix(&shared).filter(|_| !is_side).unwrap_or(&simple).to_owned()
     };
     names.iter().map(own).collect()
 }
 
+fn without_subject(name: &str) -> &str {
+    name.rsplit_once(':').map_or(name, |(_, own)| own)
+}
+
 /// Lower-case letters and digits, without a subject's name.
 fn simplified(name: &str) -> String {
-    let own = name.rsplit_once(':').map_or(name, |(_, own)| own);
-    let mut simple: String =
-        own.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase()).collect();
+    let mut simple: String = without_subject(name)
+        .chars()
+        .filter(char::is_ascii_alphanumeric)
+        .map(|c| c.to_ascii_lowercase())
+        .collect();
     for prefix in PREFIXES {
         if let Some(rest) = simple.strip_prefix(prefix).filter(|rest| !rest.is_empty()) {
             simple = rest.to_owned();
@@ -293,6 +302,21 @@ mod tests {
             assert_eq!(of("Chest"), Some("Spine"));
             assert_eq!(limbs.map(of), [Some("LeftArm"), Some("RightForeArm"), Some("LeftLeg")]);
         }
+    }
+
+    #[test]
+    fn parts_of_people_have_limbs_and_a_shared_prefix_is_not_a_side_or_a_subject() {
+        let keypoints = |names: &str| {
+            let names: Vec<String> = names.split_whitespace().map(str::to_owned).collect();
+            keypoints(&names).len()
+        };
+        let mouse = "nose left_ear right_ear left_shoulder right_shoulder left_hip right_hip tail_base";
+        assert_eq!(keypoints(mouse), 0);
+        assert_eq!(keypoints("left_shoulder left_elbow left_wrist left_hip left_knee left_ankle"), 6);
+        let names = "hip abdomen chest neck head rCollar rShldr rForeArm rHand lCollar lShldr lForeArm lHand rThigh rShin rFoot \
+                     lThigh lShin lFoot";
+        let of_subject: Vec<String> = names.split_whitespace().map(|name| format!("S_1:{name}")).collect();
+        assert_eq!(template_of(&of_subject.join(" ")), template_of(names));
     }
 
     #[test]

@@ -68,7 +68,7 @@ impl<'m> Person<'m> {
         let count = all.iter().filter(|passage| passage.len() > GAP_FRAMES).count();
         (count > 1).then(|| {
             format!(
-                "the person is not seen between {count} passages, which the answer for the whole joins; use `windows` and \
+                "the person has no silhouette of their own between {count} passages, which the answer for the whole joins; use `windows` and \
                  `segments`, or cut the masks (farnear silhouettes passages) and recognise each passage"
             )
         })

@@ -231,6 +231,19 @@ impl<'a> Images<'a> {
     }
 }
 
+/// Evens out an image of a relative brightness. Where a dark one of integers has more than white, the others are clipped.
+pub(super) fn even(image: &mut Array2<f32>, gain: f32, are_integers: bool) {
+    if gain != 1.0 {
+        let white = if are_integers { 1.0 } else { f32::INFINITY };
+        image.mapv_inplace(|value| if value / gain > white { white } else { value / gain });
+    }
+}
+
+/// The least of the relative brightnesses, at most 1. Evened out, such an image has so much larger steps of its codes.
+pub(super) fn darkest(gains: impl Iterator<Item = f32>) -> f32 {
+    gains.fold(1.0, f32::min)
+}
+
 impl Slices for Images<'_> {
     type Error = WorkflowError;
 
@@ -247,14 +260,12 @@ impl Slices for Images<'_> {
         if self.white_level != 1.0 {
             image.mapv_inplace(|value| relative(value, self.white_level));
         }
-        if self.gains[index] != 1.0 {
-            image /= self.gains[index];
-        }
+        even(&mut image, self.gains[index], self.code_step > 0.0);
         Ok(image.into())
     }
 
     fn code_step(&self) -> f32 {
-        self.code_step / self.white_level
+        self.code_step / (self.white_level * darkest(self.gains.iter().copied()))
     }
 
     fn measured(&self, rows: usize, of: usize) -> Result<()> {

@@ -11,7 +11,7 @@ use ndarray::{Array2, ArrayView2};
 
 use super::{
     black_border, frames,
-    images::{fill_specks, mark_specks},
+    images::{darkest, even, fill_specks, mark_specks},
     withhold,
 };
 use crate::{context::Context, error::Result};
@@ -26,6 +26,8 @@ pub struct PreparedStack {
     /// Indices of the images that were left out.
     pub left_out: Vec<usize>,
     pub warnings: Vec<String>,
+    /// Step of the pixels' codes after the brightness was evened out.
+    pub code_step: f32,
     /// Farthest distance that alignment moved a pixel; `None` without.
     pub moved_px: Option<f64>,
     /// Pixels that an image has no value for.
@@ -40,9 +42,11 @@ impl PreparedStack {
 }
 
 /// Leaves out images that show another scene, are turned or shaken, unless `use_all` is set; evens out the brightness of the
-/// others and aligns them. Pixels are NaN where an image does not show the scene, also in borders of zeros.
+/// others and aligns them. Pixels are NaN where an image does not show the scene, also in borders of zeros. `code_step` is that
+/// of integers from 0 to 1, and 0 for other images.
 pub fn prepare_stack(
     mut images: Vec<Array2<f32>>,
+    code_step: f32,
     mut positions: Vec<f64>,
     model: Option<Model>,
     use_all: bool,
@@ -69,15 +73,14 @@ pub fn prepare_stack(
         context.cancel.check("aligning the stack")?;
         let (warp, gain) = (&frames.warps[index], frames.gains[index]);
         mark_specks(&mut unseen, image.dim(), &specks[index], None, warp);
-        if gain != 1.0 {
-            *image /= gain as f32;
-        }
+        even(image, gain as f32, code_step > 0.0);
         if *warp != Warp::IDENTITY {
             *image = resample(image.view(), warp);
         }
     }
     let moved_px = model.and(images.first()).map(|first| frames::farthest_px(&frames.warps, first.dim()));
-    Ok(PreparedStack { images, positions, left_out, warnings, moved_px, unseen })
+    let code_step = code_step / darkest(frames.gains.iter().map(|gain| *gain as f32));
+    Ok(PreparedStack { images, positions, left_out, warnings, code_step, moved_px, unseen })
 }
 
 #[cfg(test)]
@@ -112,7 +115,7 @@ mod tests {
         let mut images = stack();
         images[2][(20, 30)] = f32::NAN;
         let positions: Vec<f64> = (0..7).map(f64::from).collect();
-        let prepared = prepare_stack(images, positions, None, true, &Context::unattended()).unwrap();
+        let prepared = prepare_stack(images, 0.0, positions, None, true, &Context::unattended()).unwrap();
         let views: Vec<ArrayView2<f32>> = prepared.images.iter().map(|image| image.view()).collect();
         let settings = StackSettings { median_px: 1, guided_px: 0.0, ..StackSettings::default() };
         let mut map = depth_from_positions(&views[..], &prepared.positions, &settings).unwrap();
@@ -125,7 +128,7 @@ mod tests {
     fn the_flag_stops_the_comparison() {
         let flag = Arc::new(AtomicBool::new(false));
         let context = Context::new(&Unattended, &Unattended, Cancel::from(Arc::clone(&flag)));
-        let prepare = || prepare_stack(stack(), (0..7).map(f64::from).collect(), None, false, &context);
+        let prepare = || prepare_stack(stack(), 0.0, (0..7).map(f64::from).collect(), None, false, &context);
         assert!(prepare().is_ok());
         flag.store(true, Ordering::Relaxed);
         assert!(prepare().unwrap_err().is_cancelled());

@@ -26,16 +26,16 @@ struct Order {
 
 /// Labels of a person's points; empty if they do not tell most points apart.
 pub fn labels(points: &[Value]) -> Vec<String> {
-    let by = |key: &&str| -> Option<Vec<String>> {
-        let label = |point: &Value| match point.get(*key)? {
+    let by = |key: &str, all: bool| -> Option<Vec<String>> {
+        let label = |point: &Value| match point.get(key)? {
             Value::String(name) => Some(name.clone()),
             other => Some(other.as_f64()?.to_string()),
         };
         let labels: Vec<String> = points.iter().map(label).collect::<Option<_>>()?;
         let distinct = labels.iter().collect::<HashSet<_>>().len();
-        (2 * distinct > labels.len()).then_some(labels)
+        (distinct == labels.len() || !all && 2 * distinct > labels.len()).then_some(labels)
     };
-    KEYS.iter().find_map(by).unwrap_or_default()
+    [true, false].iter().find_map(|all| KEYS.iter().find_map(|key| by(key, *all))).unwrap_or_default()
 }
 
 /// Puts points with labels in the order of a layout, and reports it. Fails if no person remains, or if two points of a
@@ -98,7 +98,8 @@ fn by_number(labels: &[String], frames: &[Vec<Person>]) -> Option<Order> {
             let raw = person.raw.get(person.labels.iter().position(is_it)?)?;
             raw.in_space().or_else(|| raw.in_picture())
         };
-        (spatial::asymmetry(people(), layout, point), first, layout)
+        // Without limbs of both sides nothing favours a layout.
+        (spatial::asymmetry(people(), layout, point).unwrap_or(f64::INFINITY), first, layout)
     });
     let (_, first, layout) = measured.min_by(|a, b| a.0.total_cmp(&b.0))?;
     let about = format!(

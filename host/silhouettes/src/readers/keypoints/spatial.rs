@@ -57,7 +57,7 @@ pub fn layout<'a>(
     let count = own.map_or(0, |layout| layout.count);
     let orders = [Some(&HUMAN36M), own].into_iter().flatten().filter(|order| order.count == count);
     let in_space = |person: &Person, place: usize| person.raw.get(place)?.in_space();
-    let measured = orders.map(|order| (asymmetry(people.clone(), order, in_space), order));
+    let measured = orders.map(|order| (asymmetry(people.clone(), order, in_space).unwrap_or(0.0), order));
     let best =
         measured.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(asymmetry, _)| *asymmetry <= MOST_ASYMMETRY);
     best.map(|(_, order)| order).ok_or_else(|| RecordingError::Kind {
@@ -69,12 +69,13 @@ pub fn layout<'a>(
     })
 }
 
-/// Mean difference of left and right limbs relative to their length; `point` is that of a person at a place in the order.
+/// Mean difference of left and right limbs relative to their length, `None` without limbs of both sides; `point` is that of a
+/// person at a place in the order.
 pub fn asymmetry<'a>(
     people: impl Iterator<Item = &'a Person>,
     order: &Layout,
     point: impl Fn(&Person, usize) -> Option<Point3>,
-) -> f64 {
+) -> Option<f64> {
     let place =
         |side: char, joint: char| order.points.iter().position(|short| short.chars().eq([side, joint]));
     let (mut sum, mut count) = (0.0, 0_usize);
@@ -93,5 +94,5 @@ pub fn asymmetry<'a>(
             }
         }
     }
-    sum / count.max(1) as f64
+    (count > 0).then(|| sum / count as f64)
 }

@@ -78,10 +78,11 @@ pub fn read(
             for (place, column) in body {
                 let [x, y] = column.place.map(|column| cell(row, column));
                 if let Some([x, y, _]) = point([x, y, "0"], line(row))? {
-                    let sure = column.sure.and_then(|column| number(cell(row, column)));
-                    let third = column.depth.and_then(|column| number(cell(row, column)));
+                    let of =
+                        |column: Option<usize>| number(cell(row, column?)).filter(|value| value.is_finite());
+                    let third = of(column.depth);
                     // A column named as a depth holds no confidence.
-                    let sure = sure.filter(|sure| sure.is_finite()).or(has_z.then_some(1.0));
+                    let sure = of(column.sure).or(has_z.then_some(1.0));
                     raw[*place] = Raw { x, y, third, sure };
                 }
             }
@@ -107,7 +108,8 @@ pub fn read(
         );
         return Err(RecordingError::Line { line: 1, reason });
     }
-    let about = format!("{known} of {} named points are keypoints", points.len());
+    let ignored = if has_z { "; their z is taken as a depth next to a picture and ignored" } else { "" };
+    let about = format!("{known} of {} named points are keypoints{ignored}", points.len());
     found(Document::of_frames(frames), choices, Some(about)).map(Some)
 }
 
@@ -144,7 +146,7 @@ fn confidence(column: &str) -> Option<(&str, &'static str)> {
 
 /// Name of a point, and 0 for x, 1 for y, 2 for z, 3 for the confidence of this kind.
 fn field<'a>(column: &'a str, kind: Option<&str>) -> Option<(&'a str, usize)> {
-    let mocapnet = MOCAPNET.iter().enumerate().find_map(|(axis, start)| {
+    let mocapnet = MOCAPNET.iter().zip([0, 1, 3]).find_map(|(start, axis)| {
         let (begin, name) = column.split_at_checked(start.len())?;
         begin.eq_ignore_ascii_case(start).then_some((name, axis))
     });
@@ -306,7 +308,10 @@ mod tests {
             short.replace("wrist", "hand").replace("ankle", "foot").replace("nose", "head")
         };
         let header = cells(|part, _| format!("2DX_{0},2DY_{0},visible_{0}", name(part)));
-        let row = cells(|_, [x, y]| format!("{},{},1", x / 320.0, y / 200.0));
-        expect_person(&format!("frameNumber,skeletonID,totalSkeletons{header}\n0,0,1{row}\n1,0,1{row}\n"), 2);
+        for visible in ["1", "95"] {
+            let row = cells(|_, [x, y]| format!("{},{},{visible}", x / 320.0, y / 200.0));
+            let csv = format!("frameNumber,skeletonID,totalSkeletons{header}\n0,0,1{row}\n1,0,1{row}\n");
+            expect_person(&csv, 2);
+        }
     }
 }

@@ -313,7 +313,7 @@ fn flicker_costs_nothing() {
     let uncompared = gains(&views[..]).unwrap();
     assert_eq!(checked(&images, &even_positions(), None).gains, uncompared, "as by --use-all");
     let context = Context::unattended();
-    let prepared = super::super::prepare_stack(images, even_positions(), None, false, &context).unwrap();
+    let prepared = super::super::prepare_stack(images, 0.0, even_positions(), None, false, &context).unwrap();
     assert_eq!(prepared.left_out, [0; 0]);
     let (found, known, _) = error(&prepared.images, Vec::new());
     assert!(untreated > 1.1 * clean, "{untreated} {clean}: the factors must matter");
@@ -337,7 +337,8 @@ fn exposures_of_any_factor_cost_nothing() {
         };
         let images: Vec<Array2<f32>> = good.iter().enumerate().map(exposed).collect();
         let context = Context::unattended();
-        let prepared = super::super::prepare_stack(images, even_positions(), None, false, &context).unwrap();
+        let prepared =
+            super::super::prepare_stack(images, 0.0, even_positions(), None, false, &context).unwrap();
         assert_eq!(prepared.left_out, [0; 0], "{number}: {:?}", prepared.warnings);
         let (found, known, _) = error(&prepared.images, Vec::new());
         assert!(found < 1.05 * clean && known > 0.98, "{number}: {found} {clean} {known}");

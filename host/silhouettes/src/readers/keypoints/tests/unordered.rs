@@ -228,6 +228,20 @@ fn numbers_of_another_layout_are_distinguished_from_coco_without_ankles_by_equal
     }
 }
 
+/// No layout is chosen because none of its limbs is seen.
+#[test]
+fn hidden_points_do_not_favour_a_layout_without_limbs() {
+    let seen: Vec<usize> = [0].into_iter().chain(5..14).chain([15]).collect();
+    let json = frames(&[seen.clone(), seen], LABELS[0]);
+    // A person is not symmetric.
+    let [x, y, _] = person(layout(17), 100.0)[7];
+    let moved = json.replace(&format!(r#""x":{x},"y":{y}"#), &format!(r#""x":{},"y":{y}"#, x + 3.0));
+    assert_ne!(moved, json);
+    let found = read(moved.as_bytes(), "json", Choices::default()).expect("keypoints");
+    let remarks = found.remarks().join("; ");
+    assert!(remarks.contains(layout(17).name), "{remarks}");
+}
+
 #[test]
 fn seven_points_of_a_person_are_enough() {
     let seven = vec![0, 5, 6, 11, 12, 13, 15];
