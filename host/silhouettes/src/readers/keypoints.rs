@@ -3,6 +3,7 @@
 //! frame are those of an adult. In three dimensions lengths are metres. People without numbers are followed by place.
 
 mod document;
+mod json;
 mod labels;
 mod layouts;
 mod people;

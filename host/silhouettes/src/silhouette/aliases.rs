@@ -54,16 +54,25 @@ pub fn find(names: &[String]) -> Option<Aliases> {
 pub fn keypoints(names: &[String]) -> Vec<(usize, String)> {
     /// Fewer names are not those of a body.
     const LEAST: usize = 6;
-    let simple = all_simplified(names);
     let Ok(template) = Template::named("keypoints") else { return Vec::new() };
-    let namings = NAMINGS.iter().filter(|naming| naming.template == template.name);
-    let all = namings.map(|naming| matched(&simple, &template, Some(naming)));
-    let best = all.rev().max_by_key(Vec::len).unwrap_or_default();
+    let best = known_keypoints(names, &template);
     let known: Vec<String> = best.iter().map(|(_, name)| name.clone()).collect();
     // Animals have a nose, shoulders and hips, too.
     let has_limb = known.iter().any(|name| name.ends_with("elbow") || name.ends_with("knee"));
     let are_most = has_limb && best.len() >= LEAST && 5 * best.len() >= 4 * names.len();
     if are_most || template.check(&known).is_ok() { best } else { Vec::new() }
+}
+
+/// Whether some names are those of a body, but too few of a person.
+pub fn are_of_another_body(names: &[String]) -> bool {
+    Template::named("keypoints").is_ok_and(|template| known_keypoints(names, &template).len() >= 3)
+}
+
+fn known_keypoints(names: &[String], template: &Template) -> Vec<(usize, String)> {
+    let simple = all_simplified(names);
+    let namings = NAMINGS.iter().filter(|naming| naming.template == template.name);
+    let all = namings.map(|naming| matched(&simple, template, Some(naming)));
+    all.rev().max_by_key(Vec::len).unwrap_or_default()
 }
 
 /// Each point of the template once, with the first matching name.

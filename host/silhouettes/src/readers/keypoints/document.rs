@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use serde_json::{Map, Value};
 
 use super::{
+    json::{finite, first_number, number, text},
     labels::labels,
     layouts::{Layout, NAMED, NAMES},
 };
@@ -175,7 +176,7 @@ impl Document {
     fn whole(&mut self, value: &Value) {
         match value {
             Value::Array(items) if items.iter().any(|item| picture_of(item).is_some()) => {
-                self.by_picture(items, &[]);
+                self.by_picture(items, None);
             }
             Value::Array(items) => {
                 self.is_list = true;
@@ -183,8 +184,7 @@ impl Document {
             }
             Value::Object(map) => {
                 if let Some(items) = map.get("annotations").and_then(Value::as_array) {
-                    let pictures = map.get("images").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
-                    return self.by_picture(items, pictures);
+                    return self.by_picture(items, Some(map));
                 }
                 if let Some(items) = FRAMES.iter().find_map(|key| map.get(*key)?.as_array()) {
                     return self.frames_of(items);
@@ -222,11 +222,14 @@ impl Document {
         }
     }
 
-    /// Pictures between them without people are empty frames.
-    fn by_picture(&mut self, items: &[Value], pictures: &[Value]) {
+    /// Pictures between them without people are empty frames. `about` has COCO's lists of pictures and categories.
+    fn by_picture(&mut self, items: &[Value], about: Option<&Map<String, Value>>) {
+        let list =
+            |key: &str| about.and_then(|about| about.get(key)?.as_array()).map_or(&[][..], Vec::as_slice);
+        let named: BTreeMap<String, Vec<String>> = list("categories").iter().filter_map(category).collect();
         let mut frames: Named = BTreeMap::new();
         let mut names: BTreeMap<String, String> = BTreeMap::new();
-        for picture in pictures {
+        for picture in list("images") {
             if let (Some(id), Some(name)) =
                 (picture.get("id").and_then(text), picture.get("file_name").and_then(Value::as_str))
             {
@@ -238,8 +241,12 @@ impl Document {
             let Some(picture) = picture_of(item) else { continue };
             let is_coco = item.get("image_id").is_some();
             let key = split(names.get(&picture).unwrap_or(&picture));
-            let people = self.entry(item).into_iter();
-            let people = people.map(|person| if is_coco { person.scored() } else { person });
+            let points = item.get("category_id").and_then(text).and_then(|id| named.get(&id));
+            let people = match points.and_then(|names| annotated(item, names)) {
+                Some(person) => vec![person],
+                None => self.entry(item),
+            };
+            let people = people.into_iter().map(|person| if is_coco { person.scored() } else { person });
             frames.entry(key).or_default().extend(people);
         }
         self.numbered(frames);
@@ -312,7 +319,6 @@ impl Document {
         let Value::Object(map) = value else {
             return points(value, None);
         };
-        let id = ["person_id", "idx", "track_id"].iter().find_map(|key| first_number(map.get(*key)?));
         let confidences = CONFIDENCES.iter().find_map(|key| map.get(*key)?.as_array());
         let found = POINTS.iter().find_map(|key| {
             let value = map.get(*key)?;
@@ -321,7 +327,7 @@ impl Document {
             let person = points(value, confidences.map(Vec::as_slice))?;
             Some(if OPENPOSE.contains(key) { person.scored() } else { person })
         })?;
-        Some(Person { id: id.filter(|id| *id >= 0.0).map(|id| id as i64), ..found })
+        Some(Person { id: id_of(map), ..found })
     }
 }
 
@@ -360,6 +366,29 @@ fn points_of(items: &[Value], confidences: Option<&[Value]>) -> Option<Person> {
     Some(Person { raw, layout, id: None, labels, in_triples, points: Vec::new() })
 }
 
+fn id_of(person: &Map<String, Value>) -> Option<i64> {
+    let id = ["person_id", "idx", "track_id"].iter().find_map(|key| first_number(person.get(*key)?));
+    id.filter(|id| *id >= 0.0).map(|id| id as i64)
+}
+
+/// Id of a COCO category and the names of its points.
+fn category(category: &Value) -> Option<(String, Vec<String>)> {
+    let names = category.get("keypoints")?.as_array()?.iter();
+    let names: Vec<String> = names.map(|name| Some(name.as_str()?.to_owned())).collect::<Option<_>>()?;
+    Some((text(category.get("id")?)?, names)).filter(|(_, names)| !names.is_empty())
+}
+
+/// A COCO annotation of a category with names.
+fn annotated(annotation: &Value, names: &[String]) -> Option<Person> {
+    let numbers =
+        annotation.get("keypoints")?.as_array().filter(|numbers| numbers.len() == 3 * names.len())?;
+    let scored = |raw: Raw| Raw { third: None, sure: raw.third, ..raw };
+    let raw = numbers.chunks_exact(3).map(|numbers| scored(of_numbers(numbers))).collect();
+    let layout = Layout::of(names.len()).unwrap_or(&NAMED);
+    let id = id_of(annotation.as_object()?);
+    Some(Person { raw, layout, id, labels: names.to_vec(), in_triples: false, points: Vec::new() })
+}
+
 fn of_numbers(numbers: &[Value]) -> Raw {
     let at = |k: usize| numbers.get(k).map(|value| number(value).unwrap_or(f64::NAN));
     Raw { x: at(0).unwrap_or(f64::NAN), y: at(1).unwrap_or(f64::NAN), third: at(2), sure: at(3) }
@@ -376,32 +405,6 @@ fn of_object(map: &Map<String, Value>) -> Option<Raw> {
     let place = map.get("position").and_then(Value::as_object).unwrap_or(map);
     let [x, y] = ["x", "y"].map(|key| place.get(key).map(|value| number(value).unwrap_or(f64::NAN)));
     Some(Raw { x: x?, y: y?, third: place.get("z").and_then(number), sure: sure.or(Some(1.0)) })
-}
-
-/// Some programs write numbers as text.
-fn number(value: &Value) -> Option<f64> {
-    value.as_f64().or_else(|| value.as_str()?.trim().parse().ok())
-}
-
-/// `NaN` and `Infinity`, which Python's json module writes, as `null`.
-fn finite(bytes: &[u8]) -> Vec<u8> {
-    let mut out = Vec::with_capacity(bytes.len());
-    let (mut at, mut quoted) = (0, false);
-    while let Some(&byte) = bytes.get(at) {
-        let not_finite = ["NaN", "-Infinity", "Infinity"]
-            .into_iter()
-            .find(|word| !quoted && bytes[at..].starts_with(word.as_bytes()));
-        if let Some(word) = not_finite {
-            out.extend(b"null");
-            at += word.len();
-            continue;
-        }
-        let length = if quoted && byte == b'\\' { 2 } else { 1 };
-        quoted ^= byte == b'"';
-        out.extend(&bytes[at..bytes.len().min(at + length)]);
-        at += length;
-    }
-    out
 }
 
 /// Points of Ultralytics' columns `x`, `y` and `visible`.
@@ -445,16 +448,6 @@ fn picture_of(item: &Value) -> Option<String> {
     text(id).filter(|_| item.get("instances").is_none())
 }
 
-/// An id as text. Decimals of one length sort by value.
-fn text(id: &Value) -> Option<String> {
-    match id {
-        Value::String(name) => Some(name.clone()),
-        Value::Number(number) if number.is_f64() => Some(format!("{:.6}", number.as_f64()?)),
-        Value::Number(number) => Some(number.to_string()),
-        _ => None,
-    }
-}
-
 fn split(name: &str) -> Name {
     let mut pieces = Name::new();
     let mut rest = name;
@@ -474,13 +467,6 @@ fn step(from: &Name, to: &Name) -> Option<u128> {
     let (before, after) = differing.next().filter(|_| from.len() == to.len())?;
     let alone = differing.next().is_none() && before.0 == after.0;
     after.1.checked_sub(before.1).filter(|_| alone)
-}
-
-fn first_number(value: &Value) -> Option<f64> {
-    match value {
-        Value::Array(items) => first_number(items.first()?),
-        other => number(other),
-    }
 }
 
 fn size(value: &Value) -> Option<[f64; 2]> {

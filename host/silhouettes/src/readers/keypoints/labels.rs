@@ -131,10 +131,12 @@ fn by_name(labels: &[String]) -> Option<Order> {
 /// People without a known number of points are left out.
 fn by_place(labels: &[String], frames: &mut [Vec<Person>]) -> Result<String, RecordingError> {
     let names = labels.iter().take(6).map(String::as_str).collect::<Vec<_>>().join(", ");
+    let is_animal = aliases::are_of_another_body(labels);
     let mut left_out = 0;
     for people in frames.iter_mut() {
         let before = people.len();
-        people.retain(|person| person.labels.is_empty() || Layout::of(person.raw.len()).is_some());
+        let is_known = |person: &Person| !is_animal && Layout::of(person.raw.len()).is_some();
+        people.retain(|person| person.labels.is_empty() || is_known(person));
         left_out += before - people.len();
     }
     let Some(person) = frames.iter().flatten().next() else {

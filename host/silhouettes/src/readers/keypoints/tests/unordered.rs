@@ -272,3 +272,37 @@ fn poses_of_ml5_are_read_by_the_names_of_their_points() {
     upright(&format!("[{pose},{pose}]"), 2);
     upright(&format!("[[{pose}],[]]"), 2);
 }
+
+/// The names of COCO's categories tell the order of the points and that they are triples, also of numbers of points that no layout has.
+#[test]
+fn the_categories_of_coco_name_its_points() {
+    let read_with = |names: &[String], numbers: &str| {
+        let names: Vec<String> = names.iter().map(|name| format!("{name:?}")).collect();
+        let json = format!(
+            r#"{{"images":[{{"id":1,"file_name":"a1.jpg"}}],"categories":[{{"id":1,"name":"person","keypoints":[{}]}}],
+               "annotations":[{{"id":5,"image_id":1,"category_id":1,"keypoints":[{numbers}]}}]}}"#,
+            names.join(",")
+        );
+        read(json.as_bytes(), "json", Choices::default())
+    };
+    let points = person(layout(17), 100.0);
+    let of = |order: &[usize]| {
+        let names: Vec<String> = order.iter().map(|n| COCO[*n].to_owned()).collect();
+        let numbers: Vec<String> =
+            order.iter().map(|n| format!("{},{},2", points[*n][0], points[*n][1])).collect();
+        (names, numbers.join(","))
+    };
+    for order in [(0..17).rev().collect::<Vec<_>>(), (5..17).collect(), (3..17).rev().collect()] {
+        let (names, numbers) = of(&order);
+        let found = read_with(&names, &numbers).expect("people");
+        let found = found.by_name(0);
+        assert!((found["left shoulder"][2] - found["left ankle"][2] - 1340.0).abs() < 60.0, "{found:?}");
+    }
+    // A tiger.
+    let (mut names, numbers) = of(&(0..17).collect::<Vec<_>>());
+    for (at, name) in names.iter_mut().enumerate().skip(5) {
+        *name = format!("paw_{at}");
+    }
+    let error = read_with(&names, &numbers).expect_err("an animal").to_string();
+    assert!(error.contains("too few of its named points"), "{error}");
+}
