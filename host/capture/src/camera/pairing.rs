@@ -1,6 +1,7 @@
 //! Pairs frames with exposures. One set of rules for all cameras, based on frame count, time stamps, arrival,
 //! file time and pixels. From arming to the end of the last program the n-th frame belongs to the n-th trigger.
-//! The camera's count must advance with the board's trigger number, and its time stamps with the strobe.
+//! The camera's count must advance with the board's trigger number, apart from triggers that the camera missed, and its
+//! time stamps with the strobe.
 //! Contradictions are errors, never guesses. A surplus or missing frame is found at the end of the program at
 //! the latest ([`super::Camera::finish`]).
 

@@ -11,12 +11,15 @@ use std::{
 use super::genicam_camera::ALONE;
 use farnear_capture::{
     Client,
-    camera::{Camera, CameraError, GenicamCamera, Setting, SimCamera},
+    camera::{Camera, CameraError, GenicamCamera, Image, Setting, SimCamera},
     continuous::{Continuous, Loss, Outcome, Pace},
     pair::{CaptureError, Exposures, Pair, capture_pair, reach},
     plan::SensorPair,
 };
-use farnear_protocol::{message::TriggerMode, units::Micros};
+use farnear_protocol::{
+    message::{ShotRecord, TriggerMode},
+    units::Micros,
+};
 
 /// Far and near focus of the default lens.
 const SENSOR: SensorPair = SensorPair { far_mm: 52.831_257, near_mm: 52.987_52 };
@@ -176,6 +179,47 @@ fn software_triggers_give_their_frames_and_a_held_camera_is_reported() {
     let frames = second.stamp.count.unwrap() - first.stamp.count.unwrap();
     let time = second.stamp.time.unwrap() - first.stamp.time.unwrap();
     assert_eq!(time, Duration::from_millis(40) * u32::try_from(frames).unwrap());
+}
+
+/// Its first frame comes incomplete.
+struct Damaging(SimCamera, bool);
+
+impl Camera for Damaging {
+    fn kind(&self) -> &'static str {
+        "damaging"
+    }
+    fn arm(&mut self, mode: TriggerMode, exposure: Micros) -> Result<(), CameraError> {
+        self.0.arm(mode, exposure)
+    }
+    fn pairs_by_frames_before(&self) -> bool {
+        true
+    }
+    fn trigger(&mut self, trigger_number: u32, exposure: Micros) -> Result<(), CameraError> {
+        self.0.trigger(trigger_number, exposure)
+    }
+    fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError> {
+        let image = self.0.image(shot, wait)?;
+        match std::mem::replace(&mut self.1, true) {
+            true => Ok(image),
+            false => Err(CameraError::Incomplete { camera: "it".into(), frame: 1, reason: "cut".into() }),
+        }
+    }
+}
+
+#[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
+fn a_continuous_run_begins_after_an_incomplete_first_frame() {
+    let rig = Rig::start(9, &[]);
+    let client = rig.client();
+    let mut camera = Damaging(SimCamera::connect(&rig.camera).unwrap(), false);
+    let shots = reach(&client, &SENSOR, &Exposures::default(), &mut |_| {}).unwrap().shots;
+    let pace = Pace { period: Micros(0), exposures: 4 };
+    let mut stream = Continuous::start(&client, &mut camera, &shots, pace, WAIT).unwrap();
+    let mut whole = 0;
+    while let Some(outcome) = stream.outcome().unwrap() {
+        whole += usize::from(matches!(outcome, Outcome::Taken(_)));
+    }
+    assert_eq!(whole, 4);
 }
 
 #[test]

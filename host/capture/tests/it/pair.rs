@@ -26,9 +26,9 @@ use crate::scripted::SHOT;
 
 const SENSOR: SensorPair = SensorPair { far_mm: 52.8313, near_mm: 52.9875 };
 
-struct Answering(fn(&ShotRecord) -> Result<Image, CameraError>);
+struct Answering<F>(F);
 
-impl Camera for Answering {
+impl<F: FnMut(&ShotRecord) -> Result<Image, CameraError>> Camera for Answering<F> {
     fn kind(&self) -> &'static str {
         "answering"
     }
@@ -43,12 +43,14 @@ impl Camera for Answering {
     }
 }
 
-fn numbered() -> Answering {
-    Answering(|shot| Ok(Image::new(Array2::from_elem((3, 4), shot.trigger_number as u16), 8)))
+fn numbered() -> impl Camera {
+    Answering(|shot: &ShotRecord| Ok(Image::new(Array2::from_elem((3, 4), shot.trigger_number as u16), 8)))
 }
 
-fn one_ahead() -> Answering {
-    Answering(|shot| Err(CameraError::Skipped { wanted: shot.trigger_number, came: shot.trigger_number + 1 }))
+fn one_ahead() -> impl Camera {
+    Answering(|shot: &ShotRecord| {
+        Err(CameraError::Skipped { wanted: shot.trigger_number, came: shot.trigger_number + 1 })
+    })
 }
 
 fn client() -> (Client, Peer) {
@@ -210,35 +212,18 @@ fn a_surplus_picture_fails_the_pair() {
     assert!(matches!(error, CaptureError::Camera(CameraError::Surplus { .. })), "{error:?}");
 }
 
-/// Half of white at each exposure time.
-#[derive(Default)]
-struct Grey {
-    exposures_us: Vec<u32>,
-}
-
-impl Camera for Grey {
-    fn kind(&self) -> &'static str {
-        "grey"
-    }
-    fn arm(&mut self, _: TriggerMode, _: Micros) -> Result<(), CameraError> {
-        Ok(())
-    }
-    fn trigger(&mut self, _: u32, _: Micros) -> Result<(), CameraError> {
-        Ok(())
-    }
-    fn image(&mut self, shot: &ShotRecord, _: Duration) -> Result<Image, CameraError> {
-        self.exposures_us.push(shot.exposure.0);
-        Ok(Image::new(Array2::from_elem((3, 4), 128), 8))
-    }
-}
-
 #[test]
 fn the_automatic_exposure_time_is_one_that_was_tried() {
     let (client, _peer) = client();
-    let (mut camera, mut messages) = (Grey::default(), String::new());
+    let (mut exposures_us, mut messages) = (Vec::new(), String::new());
+    let mut half_of_white = Answering(|shot: &ShotRecord| {
+        exposures_us.push(shot.exposure.0);
+        Ok(Image::new(Array2::from_elem((3, 4), 128), 8))
+    });
     let auto = Exposures { auto: true, ..exposures() };
-    let pair = capture_pair(&client, &mut camera, &SENSOR, &auto, &mut |text| messages += text).unwrap();
-    let (tried, pair_us) = camera.exposures_us.split_at(camera.exposures_us.len() - 2);
+    let pair =
+        capture_pair(&client, &mut half_of_white, &SENSOR, &auto, &mut |text| messages += text).unwrap();
+    let (tried, pair_us) = exposures_us.split_at(exposures_us.len() - 2);
     assert_eq!(tried.len(), 8, "none is good");
     assert_eq!(pair_us, [pair.far.record.exposure.0; 2]);
     assert!(tried.contains(&pair_us[0]), "{pair_us:?} of {tried:?}");

@@ -3,7 +3,8 @@
 
 use ndarray::{Array2, ArrayViewMut1, Axis, Zip};
 
-/// Largest distance from what a plane would look like, in standard deviations.
+/// Largest distance from what a plane would look like, in standard deviations. From 1 to 2 it hardly changes rendered planes and
+/// waves.
 const PLANE: f32 = 1.5;
 
 /// Corrects depth and deviation, for windows of up to `2 half + 1` px, whose evidence begins `reach` px from the border, where

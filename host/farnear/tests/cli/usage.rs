@@ -209,6 +209,15 @@ fn figures_are_json_on_stdout_and_text_without_the_flag() {
     assert!(keys.iter().all(|key| text.contains(&format!("{key} = "))), "{text}");
 }
 
+/// Of several options for files the right one is unknown, and a number is not a file.
+#[test]
+fn no_option_is_named_by_chance() {
+    for arguments in [["rig", "capture", "optics.toml"], ["rig", "move", "0.5"]] {
+        let error = fails(&mut farnear(&arguments), 2, &["unexpected argument"]);
+        assert!(!error.contains("a file is given"), "{error}");
+    }
+}
+
 #[test]
 fn completions_name_the_commands() {
     for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {

@@ -292,4 +292,17 @@ mod tests {
         assert!(image.row(0).iter().all(|value| value.is_nan()));
         assert_eq!(fill_specks(&mut Array2::from_elem((3, 3), 1.0)), []);
     }
+
+    #[test]
+    fn a_dark_image_of_integers_is_white_at_most_and_has_larger_steps() {
+        let image = ndarray::array![[0.1_f32, 0.8, f32::NAN]];
+        for (are_integers, brightest) in [(true, 1.0), (false, 4.0)] {
+            let mut evened = image.clone();
+            even(&mut evened, 0.2, are_integers);
+            assert_eq!((evened[(0, 0)], evened[(0, 1)]), (0.5, brightest));
+            assert!(evened[(0, 2)].is_nan());
+        }
+        assert_eq!(darkest([1.0, 0.2, 3.0].into_iter()), 0.2);
+        assert_eq!(darkest([1.5, 3.0].into_iter()), 1.0);
+    }
 }
