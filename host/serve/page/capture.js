@@ -76,7 +76,9 @@ async function take(wish, depth) {
   const computing = await act(`/api/captures/${encodeURIComponent(name)}/depth`, { uncertainty: "estimated" });
   if (!computing) return;
   const computed = await ended("computation", computing.job);
-  if (computed.phase === "done" && awaited === name) depths(name);
+  if (computed.phase !== "done" || awaited !== name) return;
+  awaited = null;
+  depths(name);
 }
 
 /** Whether a job is under way. */

@@ -266,3 +266,25 @@ test("a field without a number is reported by name, and distances may have decim
   assert.deepEqual((await request).postDataJSON(), { distances: [890.5, 905, 920] });
   assert.deepEqual(page.complaints, []);
 });
+
+test("a picture of a new pair that comes after its files does not undo the choice of a layer", async () => {
+  const page = await open(browser, server.address);
+  const late = [];
+  await page.routeWebSocket(/./, (socket) => {
+    socket.connectToServer().onMessage((message) => {
+      if (typeof message !== "string" && message.includes('"type":"fresh"')) late.push(() => socket.send(message));
+      else socket.send(message);
+    });
+  });
+  await page.reload();
+  await page.waitForFunction(() => !document.querySelector("[data-capture]").disabled);
+  await page.getByRole("button", { name: "Capture pair" }).click();
+  await page.locator("button[data-layer=reason]:enabled").click();
+  const reasons = page.locator(".reasons span", { hasText: "%" }).first();
+  await reasons.waitFor();
+  assert.equal(late.length, 1);
+  late[0]();
+  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => setTimeout(done, 500))));
+  assert.ok(await reasons.isVisible());
+  await page.context().close();
+});

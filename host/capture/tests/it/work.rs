@@ -83,15 +83,23 @@ fn an_interruption_stops_the_rig() {
     let (mut client, peer) = connect(Faults { never_ends: true, brakes_for: 12, ..Faults::default() });
     let flag = Arc::new(AtomicBool::new(false));
     client.interrupt_by(flag.clone());
-    let interrupter = std::thread::spawn(move || {
-        std::thread::sleep(Duration::from_millis(20));
-        flag.store(true, Ordering::Relaxed);
+    let interrupter = std::thread::spawn({
+        let peer = peer.clone();
+        move || {
+            while peer.board().acts == 0 {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            flag.store(true, Ordering::Relaxed);
+        }
     });
     let error = client.home(Axis::SensorCoarse).err().unwrap();
     interrupter.join().unwrap();
     assert!(matches!(error, ClientError::Interrupted { .. }), "{error:?}");
-    let board = peer.board();
-    assert_eq!((board.stops, board.braking), (1, 0), "reported at standstill");
+    let (stops, braking) = {
+        let board = peer.board();
+        (board.stops, board.braking)
+    };
+    assert_eq!((stops, braking), (1, 0), "reported at standstill");
 }
 
 #[test]
