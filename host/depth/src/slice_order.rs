@@ -1,7 +1,8 @@
 //! Slices of a focal stack that are out of order. The sharpness of a place rises up to its focus and falls behind it, so the
 //! right order is the shortest path through the sharpness of all places, from no sharpness and back. Exchanged slices are
-//! those whose exchange removes most of the excess. Noise, irregular steps and a single bad slice cause an excess that no
-//! exchange removes.
+//! those whose exchange removes most of the excess, and the first slice of a wrapped stack is the one at which the path must
+//! begin. Noise, irregular steps and a single bad slice cause an excess that no exchange removes. A picture that is composed
+//! of the slices is sharp everywhere, also where they are not.
 
 use ndarray::{ArrayView2, s};
 
@@ -21,6 +22,11 @@ const LEAST: f64 = 0.04;
 const GAINING: f64 = 0.4;
 const GAIN: f64 = 0.02;
 const LOSING: f64 = 0.25;
+/// Largest excess of a wrapped stack from its first slice on, or without a composed picture, relative to that of all in the order given.
+const LEFT_OF_ALL: f64 = 0.4;
+/// Sharpness of a composed picture relative to the sharpest slice, and least part of the blocks that have it.
+const COMPOSED: f64 = 0.8;
+const COMPOSED_BLOCKS: f64 = 0.9;
 /// By how much an exchange with the first or the last slice must be better than one without: sharpness has one neighbour there.
 const AT_END: f64 = 0.1;
 
@@ -35,10 +41,7 @@ pub fn sharpness(image: ArrayView2<f32>) -> Vec<f64> {
 /// end, slices equally far from the focus of a flat target, and differences below the noise.
 pub fn exchanged(sharpness: &[Vec<f64>]) -> Vec<[usize; 2]> {
     let mut found = Vec::new();
-    if sharpness.len() < FEWEST || sharpness.iter().any(Vec::is_empty) {
-        return found;
-    }
-    let mut path = Path::of(sharpness);
+    let Some(mut path) = Path::of(sharpness) else { return found };
     while found.len() < sharpness.len() / 3
         && let Some([a, b]) = path.exchange()
     {
@@ -46,6 +49,42 @@ pub fn exchanged(sharpness: &[Vec<f64>]) -> Vec<[usize; 2]> {
         found.push([a - 1, b - 1]);
     }
     found
+}
+
+/// The first slice of a stack whose order is wrapped (6 to 9, then 1 to 5), from the [`sharpness`] of each slice in the given order.
+pub fn wrapped(sharpness: &[Vec<f64>]) -> Option<usize> {
+    let path = Path::of(sharpness)?;
+    let from = |first: usize| {
+        let mut order = path.order();
+        order[1..=sharpness.len()].rotate_left(first);
+        path.excess(&order)
+    };
+    let firsts = (1..sharpness.len()).map(|first| (first, from(first)));
+    let (first, excess) = firsts.min_by(|a, b| total(&a.1).total_cmp(&total(&b.1)))?;
+    path.is_right(&excess).then_some(first)
+}
+
+/// A slice that is sharp everywhere and does not fit into the order, such as a picture that is composed of the others, from the
+/// [`sharpness`] of each slice.
+pub fn composed(sharpness: &[Vec<f64>]) -> Option<usize> {
+    let path = Path::of(sharpness)?;
+    let is_sharp = |own: &usize| {
+        let others = || sharpness.iter().enumerate().filter(move |(other, _)| other != own);
+        let sharpest = |block: usize| others().map(|(_, other)| other[block]).fold(0.0, f64::max);
+        let blocks = sharpness[*own].iter().enumerate();
+        let sharp = blocks.filter(|(block, value)| **value >= COMPOSED * sharpest(*block)).count();
+        sharp as f64 >= COMPOSED_BLOCKS * path.ranges.len() as f64
+    };
+    let without = |own: &usize| {
+        let mut order = path.order();
+        order.remove(own + 1);
+        path.excess(&order)
+    };
+    (0..sharpness.len()).filter(is_sharp).find(|own| path.is_right(&without(own)))
+}
+
+fn total(excess: &[f64]) -> f64 {
+    excess.iter().sum()
 }
 
 /// Logarithms of sharpness by slice and block, with the least of each block before the first slice and behind the last one.
@@ -56,7 +95,10 @@ struct Path {
 }
 
 impl Path {
-    fn of(sharpness: &[Vec<f64>]) -> Self {
+    fn of(sharpness: &[Vec<f64>]) -> Option<Self> {
+        if sharpness.len() < FEWEST || sharpness.iter().any(Vec::is_empty) {
+            return None;
+        }
         let logarithms =
             |slice: &Vec<f64>| slice.iter().map(|value| value.max(f64::MIN_POSITIVE).ln()).collect();
         let mut slices: Vec<Vec<f64>> = sharpness.iter().map(logarithms).collect();
@@ -68,17 +110,22 @@ impl Path {
         let ranges = least.iter().zip(most).map(|(least, most)| most - least).collect();
         slices.insert(0, least.clone());
         slices.push(least);
-        Self { slices, ranges }
+        Some(Self { slices, ranges })
+    }
+
+    /// The order given.
+    fn order(&self) -> Vec<usize> {
+        (0..self.slices.len()).collect()
     }
 
     /// Numbers of two slices that look exchanged, from 1.
     fn exchange(&self) -> Option<[usize; 2]> {
         let count = self.slices.len() - 2;
-        let order: Vec<usize> = (0..self.slices.len()).collect();
+        let order = self.order();
         let before = self.excess(&order);
-        let total: f64 = before.iter().sum();
+        let all = total(&before);
         let is_end = |[a, b]: [usize; 2]| a == 1 || b == count;
-        let cost = |pair| self.change(pair) + if is_end(pair) { AT_END * total } else { 0.0 };
+        let cost = |pair| self.change(pair) + if is_end(pair) { AT_END * all } else { 0.0 };
         let pairs = (1..=count).flat_map(|a| (a + 1..=count).map(move |b| [a, b]));
         let pair = pairs
             .filter(|pair| !(is_end(*pair) && pair[1] == pair[0] + 1))
@@ -88,25 +135,36 @@ impl Path {
         let mut exchanged = order.clone();
         exchanged.swap(pair[0], pair[1]);
         let after = self.excess(&exchanged);
-        let left: f64 = after.iter().sum();
+        let left = total(&after);
         let absent = pair.map(|absent| {
             let others: Vec<usize> = order.iter().copied().filter(|slice| *slice != absent).collect();
-            self.excess(&others).iter().sum::<f64>()
+            total(&self.excess(&others))
         });
         let [less, more] = [absent[0].min(absent[1]), absent[0].max(absent[1])];
         let mended = if pair[1] == pair[0] + 1 {
-            more < LEFT * total && left < less + MORE_THAN_ABSENT * total
+            more < LEFT * all && left < less + MORE_THAN_ABSENT * all
         } else {
             left < LEFT_OF_ABSENT * less
         };
+        let clear = left < LEFT * all && self.is_better(&before, &after);
+        (mended && clear).then_some(pair)
+    }
+
+    /// Whether an order with this excess in each block is clearly better than another, in most blocks.
+    fn is_better(&self, before: &[f64], after: &[f64]) -> bool {
         let blocks = |better: &[f64], worse: &[f64]| {
             let gains = better.iter().zip(worse).zip(&self.ranges);
             gains.filter(|((better, worse), range)| *worse - *better > GAIN * *range).count() as f64
         };
-        let [gaining, losing] = [blocks(&after, &before), blocks(&before, &after)];
+        let [gaining, losing] = [blocks(after, before), blocks(before, after)];
         let agreed = gaining > GAINING * before.len() as f64 && losing < LOSING * gaining;
-        let clear = left < LEFT * total && total - left > LEAST * self.ranges.iter().sum::<f64>();
-        (mended && agreed && clear).then_some(pair)
+        agreed && total(before) - total(after) > LEAST * total(&self.ranges)
+    }
+
+    /// Whether an order with this excess in each block explains almost all that contradicts the order given.
+    fn is_right(&self, excess: &[f64]) -> bool {
+        let given = self.excess(&self.order());
+        total(excess) < LEFT_OF_ALL * total(&given) && self.is_better(&given, excess)
     }
 
     /// By how much an exchange changes the length of the path.
@@ -209,6 +267,7 @@ mod tests {
                 let mut bad = good.clone();
                 bad.swap(pair[0], pair[1]);
                 assert_eq!(exchanged(&bad), [pair], "{depths:?}");
+                assert_eq!((wrapped(&bad), composed(&bad)), (None, None), "{depths:?} {pair:?}");
             }
         }
     }
@@ -229,12 +288,40 @@ mod tests {
             for depths in [[3.0, 11.0], [7.0, 7.0], [-4.0, 2.0]] {
                 for noise in [0.0, 0.05, 0.4] {
                     let images = stack(&positions, depths, noise);
-                    assert!(exchanged(&measured(&images)).is_empty(), "{positions:?} {depths:?} {noise}");
+                    let good = measured(&images);
+                    assert!(exchanged(&good).is_empty(), "{positions:?} {depths:?} {noise}");
+                    assert_eq!(
+                        (wrapped(&good), composed(&good)),
+                        (None, None),
+                        "{positions:?} {depths:?} {noise}"
+                    );
                     let drift = |(index, image): (usize, &Array2<f32>)| image * (1.0 - 0.03 * index as f32);
                     let drifting: Vec<Array2<f32>> = images.iter().enumerate().map(drift).collect();
                     assert!(exchanged(&measured(&drifting)).is_empty(), "{positions:?} {depths:?} {noise}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_wrapped_order_is_found_by_its_first_slice() {
+        for depths in [[3.0, 11.0], [8.2, 9.4]] {
+            let good = measured(&stack(&even(15), depths, 0.02));
+            for first in [3, 8, 12] {
+                let mut bad = good.clone();
+                bad.rotate_right(first);
+                assert_eq!(wrapped(&bad), Some(first), "{depths:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_composed_picture_is_found_at_any_place() {
+        let good = measured(&stack(&even(15), [3.0, 11.0], 0.02));
+        for at in [0, 7, 15] {
+            let mut bad = good.clone();
+            bad.insert(at, sharpness(scene(1).view()));
+            assert_eq!(composed(&bad), Some(at));
         }
     }
 
@@ -246,7 +333,8 @@ mod tests {
             for bad in [defocused, scene(2)] {
                 let mut images = good.clone();
                 images[at] = bad;
-                assert_eq!(exchanged(&measured(&images)), [[0; 2]; 0], "{at}");
+                let found = measured(&images);
+                assert_eq!((exchanged(&found), wrapped(&found)), (vec![], None), "{at}");
             }
         }
     }

@@ -12,6 +12,7 @@
 
 pub mod blur;
 mod curve;
+mod fixed_pattern;
 pub mod focus_plane;
 mod foreign;
 mod held_out;
@@ -85,8 +86,16 @@ pub enum Moved {
 pub enum StackError {
     #[error("{0} slices: at least {FEWEST} are needed, from in front of the focus to behind it")]
     TooFew(usize),
-    #[error("slice {index} has another size than the first one")]
-    Size { index: usize },
+    #[error(
+        "slice {number} has {width}x{height} px and the first one {}x{}: all must have one size; crop them alike", of.1, of.0
+    )]
+    Size {
+        number: usize,
+        width: usize,
+        height: usize,
+        /// The first one's (height, width).
+        of: (usize, usize),
+    },
     #[error("{name} = {value}: expected a positive number")]
     NotPositive { name: &'static str, value: f64 },
     #[error("{name} = {value}: expected {expected}")]
@@ -137,6 +146,10 @@ pub struct StackLens {
     pub foreign: Vec<usize>,
     /// Slices that look exchanged.
     pub exchanged: Vec<[usize; 2]>,
+    /// The first slice, if the order looks wrapped.
+    pub wrapped: Option<usize>,
+    /// Part of the sharpest slice's finest detail that is also in the most defocused slices: of the camera, not of the target.
+    pub fixed_pattern: Option<f64>,
 }
 
 /// Calibrates from `slices`, the far-focused first, (height, width). `proceed` is called before each measurement of a pair with
@@ -195,16 +208,20 @@ pub fn calibrate_stack(
         .map(|slice| not_stopped().then(|| slice_order::sharpness(slice.view())))
         .collect::<Option<_>>()
         .ok_or(StackError::Stopped)?;
-    let exchanged = slice_order::exchanged(&sharpness);
-    Ok(StackLens { optics, plane, blur, held_out, trials, foreign, exchanged })
+    let (exchanged, wrapped) = (slice_order::exchanged(&sharpness), slice_order::wrapped(&sharpness));
+    let sharpest = plane.at(0.5 * height as f64, 0.5 * width as f64).round().max(0.0) as usize;
+    let fixed_pattern = fixed_pattern::find(slices, sharpest.min(slices.len() - 1));
+    Ok(StackLens { optics, plane, blur, held_out, trials, foreign, exchanged, wrapped, fixed_pattern })
 }
 
 fn check(slices: &[Array2<f32>], settings: &StackSettings) -> Result<(), StackError> {
     if slices.len() < FEWEST {
         return Err(StackError::TooFew(slices.len()));
     }
-    if let Some(index) = slices.iter().position(|slice| slice.dim() != slices[0].dim()) {
-        return Err(StackError::Size { index: index + 1 });
+    let of = slices[0].dim();
+    if let Some(index) = slices.iter().position(|slice| slice.dim() != of) {
+        let (number, (height, width)) = (index + 1, slices[index].dim());
+        return Err(StackError::Size { number, width, height, of });
     }
     let (object_pixel_um, far_mm) = match &settings.moved {
         Moved::Target { object_pixel_um, far_mm } => (*object_pixel_um, *far_mm),
@@ -318,6 +335,16 @@ fn optics(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn slices_of_other_sizes_are_refused_by_their_sizes() {
+        let mut slices = vec![Array2::<f32>::zeros((80, 96)); FEWEST];
+        slices[3] = Array2::zeros((80, 90));
+        let moved = Moved::Target { object_pixel_um: None, far_mm: None };
+        let settings = StackSettings { step_mm: 0.5, moved, pair_step: None, bin: None, coding: 0.0 };
+        let error = check(&slices, &settings).unwrap_err().to_string();
+        assert!(error.contains("slice 4 has 90x80 px and the first one 96x80"), "{error}");
+    }
 
     #[test]
     fn a_far_plane_within_the_range_of_a_pair_is_refused() {

@@ -6,7 +6,7 @@ use super::{LEAST_IMAGES, MOST_GUIDED_PX, MOST_SMOOTHING_PX};
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages name the fields")]
 pub enum StackError {
-    #[error("a stack of {count} images: at least {LEAST_IMAGES} are needed")]
+    #[error("a stack of {count} images: at least {LEAST_IMAGES} at different focus are needed")]
     TooFew { count: usize },
     #[error(
         "image {number} has {width}x{height} px and the first one {}x{}: they must have one size", of.1, of.0
@@ -18,7 +18,9 @@ pub enum StackError {
         /// The first one's (height, width).
         of: (usize, usize),
     },
-    #[error("images of {width}x{height} px are smaller than the window of {window_px}")]
+    #[error(
+        "images of {width}x{height} px are smaller than the window of {window_px} (window_px): give a smaller window, or larger images"
+    )]
     TooSmall { width: usize, height: usize, window_px: usize },
     #[error("{what} is {value}: an odd number from {least} to {most} is needed")]
     Odd { what: &'static str, value: usize, least: usize, most: usize },
@@ -32,6 +34,8 @@ pub enum StackError {
         "{positions} positions of {images} images: one for each is needed, all different, rising or falling"
     )]
     Positions { images: usize, positions: usize },
-    #[error("image {number}: the pixel in column {column}, row {row} is not finite")]
+    #[error(
+        "image {number}: the pixel in column {column}, row {row} is not finite: fill it, or leave the image out"
+    )]
     NotFinite { number: usize, column: usize, row: usize },
 }

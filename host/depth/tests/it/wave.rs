@@ -88,6 +88,7 @@ fn unmoved(stack: Vec<Array2<f32>>) {
     assert!((middle - TARGET.0[0]).abs() < 0.1, "{middle}");
     assert!((found.held_out.slope - 1.0).abs() < 0.02, "{:?}", found.held_out);
     assert_eq!(found.exchanged, [[0; 2]; 0]);
+    assert_eq!((found.wrapped, found.fixed_pattern), (None, None));
 }
 
 #[test]

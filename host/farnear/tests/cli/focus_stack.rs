@@ -278,6 +278,11 @@ fn invalid_stacks_are_rejected_without_output() {
     };
     refuse(&[&stack, "--distances-mm", "300, 310"], 2, "(2 numbers): one for each of the 9 images is needed");
     refuse(&[&stack, "--positions-um", "-5, 0, 5"], 2, "positions-um (3 numbers): one for each");
+    refuse(
+        &[&stack, "--sensor-mm", "52, 53", "--optics", rig_optics()],
+        2,
+        "sensor-mm (2 numbers): one for each",
+    );
     refuse(&[&stack, "--distances-mm", "300,300,320,330,340,350,360,370,380"], 2, "300 mm twice");
     refuse(&[&stack, "--distances-mm", "300,far"], 2, "invalid value 'far'");
     refuse(

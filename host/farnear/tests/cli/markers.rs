@@ -352,6 +352,18 @@ fn openpose(people: &[f64]) -> String {
 }
 
 #[test]
+fn the_shape_of_the_picture_is_checked_and_reported_where_it_has_no_effect() {
+    let folder = Folder::new();
+    let file = folder.file("one.json", openpose(&[100.0]));
+    let (out, other) = (folder.text("masks"), folder.text("other"));
+    let arguments = ["silhouettes", "markers", &file, "--aspect"];
+    let found = figures(farnear(&arguments).args(["9:16", "--out", &out, "--json"]));
+    let warnings = found["warnings"].to_string();
+    assert!(warnings.contains("--aspect 9:16 is ignored"), "{warnings}");
+    fails(farnear(&arguments).args(["9", "--out", &other]), 2, &["`9` is not the shape", "1080x1920"]);
+}
+
+#[test]
 fn a_folder_of_openpose_files_gives_masks_of_its_view_and_samples() {
     let folder = Folder::new();
     fs::create_dir(folder.path("poses")).expect("a folder");

@@ -2,11 +2,14 @@
 //! one view, x to the right and y down in the picture, and lengths are guessed from the body: the longest trunk and legs in a
 //! frame are those of an adult. In three dimensions lengths are metres. People without numbers are followed by place.
 
+pub mod aspect;
 mod document;
 mod json;
 mod labels;
 mod layouts;
+mod names;
 mod people;
+mod points;
 mod spatial;
 pub mod table;
 
@@ -16,9 +19,10 @@ use super::{
     recording::{Choices, Found, Known, RecordingError, Source, Unit, Up},
 };
 use crate::silhouette::capsule::Point3;
-use document::{Document, LEAST_CONFIDENCE};
+use document::Document;
 use layouts::NAMES;
 use people::distance;
+use points::LEAST_CONFIDENCE;
 
 pub const READER: Reader = Reader {
     name: "keypoints",
@@ -57,7 +61,7 @@ pub fn read_files<'a>(
 
 /// The first remark is `about` the points, or about their labels or layout.
 fn found(document: Document, choices: Choices, about: Option<String>) -> Result<Found, RecordingError> {
-    let Document { mut frames, size, has_wide_gaps, unread, .. } = document;
+    let Document { mut frames, size, remarks: of_document, unread, .. } = document;
     let labelled = labels::order(&mut frames)?;
     let everyone = || frames.iter().flatten();
     let with_people = frames.iter().filter(|people| !people.is_empty()).count();
@@ -87,9 +91,7 @@ fn found(document: Document, choices: Choices, about: Option<String>) -> Result<
             "values that are not the points of a person in a known layout are taken as empty: {unread} entries"
         ));
     }
-    if has_wide_gaps {
-        remarks.push("most numbers of frames are missing: the gaps between the others are closed".into());
-    }
+    remarks.extend(of_document);
     let unsure: usize = frames
         .iter_mut()
         .flatten()
@@ -106,12 +108,17 @@ fn found(document: Document, choices: Choices, about: Option<String>) -> Result<
         frames.iter().flatten().flat_map(|person| person.points.iter().flatten()).collect();
     let far = points.iter().filter(|point| point.iter().any(|value| value.abs() > NORMALISED)).count();
     if in_picture && !points.is_empty() && far as f64 <= MOST_FAR_OUTSIDE * points.len() as f64 {
-        let aspect = size.map_or(USUAL_ASPECT, |[width, height]| width / height);
-        let known = if size.is_some() { "stated" } else { "a doubtful guess" };
+        let (aspect, known) = match (choices.aspect, size) {
+            (Some(aspect), _) => (aspect.ratio(), "by --aspect"),
+            (None, Some([width, height])) => (width / height, "stated"),
+            (None, None) => (USUAL_ASPECT, "a doubtful guess; --aspect gives its shape"),
+        };
         remarks.push(format!("coordinates are parts of a picture of {aspect:.3} times its height ({known})"));
         let across = usize::from(matches!(choices.up, Some(Up::X | Up::MinusX)));
         let points = frames.iter_mut().flatten().flat_map(|person| person.points.iter_mut().flatten());
         points.for_each(|point| point[across] *= aspect);
+    } else if let Some(aspect) = choices.aspect {
+        remarks.push(format!("--aspect {aspect} is ignored, for coordinates are not parts of a picture"));
     }
     let (tracks, others) = people::followed(&frames);
     if tracks.len() > 1 {

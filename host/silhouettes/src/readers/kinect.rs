@@ -97,7 +97,8 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         rate_hz: RATE_HZ,
         frames,
         unit: Known { value: Unit { mm: 1000.0 }, source: Source::Format },
-        up: Known { value: Up::Y, source: Source::Format },
+        // The sensor's, also of a person who lies.
+        up: Known { value: Up::Y, source: Source::File },
         remarks: Vec::new(),
     })
 }

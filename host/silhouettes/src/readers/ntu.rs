@@ -88,7 +88,8 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         others,
         planar: false,
         unit: Known { value: Unit { mm: 1000.0 }, source: Source::Format },
-        up: Known { value: Up::Y, source: Source::Format },
+        // The sensor's, also of a person who lies.
+        up: Known { value: Up::Y, source: Source::File },
         remarks,
     })
 }

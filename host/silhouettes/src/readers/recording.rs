@@ -1,7 +1,7 @@
 //! Recordings of named points over time, the common form of all motion-capture files. A reader returns the
 //! file's own unit and axes with their source ([`Found`]); [`Found::settled`] converts to mm and z up.
 
-use super::{body, posture};
+use super::{body, keypoints::aspect::Aspect, posture};
 use crate::silhouette::{anatomy::Anatomy, capsule::Point3};
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -188,6 +188,8 @@ pub struct Choices {
     pub up: Option<Up>,
     /// Which of several people, from 1; `None` selects the actor.
     pub person: Option<usize>,
+    /// Of the picture, for keypoints in parts of its sides.
+    pub aspect: Option<Aspect>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -231,7 +233,7 @@ impl Found {
         let anatomy = Anatomy::of(&names);
         body::add_neck(&mut names, &anatomy.aliases, &mut frames);
         let unit = body::plausible(self.unit.unless(choices.unit), &frames, &anatomy.body);
-        let (up, inverted) = posture::checked(self.up.unless(choices.up), &frames, &anatomy);
+        let (up, inverted) = posture::checked(self.up.unless(choices.up), &frames, &anatomy, self.planar);
         let lying = posture::lying(up.value, &frames, &anatomy, self.planar);
         for point in frames.iter_mut().flatten() {
             let settled = point.map(|p| up.value.to_z(p.map(|v| unit.value.mm * v)));
@@ -417,8 +419,11 @@ mod tests {
             "what the format fixes is not a guess"
         );
         assert_eq!(by_itself.frames[2], vec![None], "what overflows is hidden");
-        let given =
-            found([1.0, 2.0, 3.0]).settled(Choices { unit: Some(Unit::MM), up: Some(Up::X), person: None });
+        let given = found([1.0, 2.0, 3.0]).settled(Choices {
+            unit: Some(Unit::MM),
+            up: Some(Up::X),
+            ..Choices::default()
+        });
         assert_eq!(given.frames[0], vec![Some([2.0, 3.0, 1.0])]);
         assert_eq!((given.unit.source.clone(), given.remarks().len()), (Source::Caller, 0));
     }

@@ -61,8 +61,11 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         .filter(|(_, group)| !group[0].is_empty())
         .map(|(place, group)| (place, group[0].to_owned()))
         .collect();
-    let packed = cells.iter().any(|c| !c.is_empty())
-        && cells.iter().skip_while(|c| c.is_empty()).take(3).filter(|c| !c.is_empty()).count() > 1;
+    let named = cells.iter().filter(|cell| !cell.is_empty()).count();
+    // Some programs write other numbers of tabs between the names.
+    let packed = named as f64 == count
+        || cells.iter().any(|c| !c.is_empty())
+            && cells.iter().skip_while(|c| c.is_empty()).take(3).filter(|c| !c.is_empty()).count() > 1;
     let (mut places, mut names): (Vec<usize>, Vec<String>) = if packed {
         cells.iter().filter(|name| !name.is_empty()).map(|name| (*name).to_owned()).enumerate().unzip()
     } else {
@@ -93,8 +96,16 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let frames = rows(&lines, &places, separator)?;
     // Without the number all frames are read.
     if let Ok(promised) = stated("NumFrames") {
-        let remark = promised_frames("NumFrames", promised, frames.len());
-        remarks.extend(remark.map_err(|reason| RecordingError::Line { line: 3, reason })?);
+        let first = lines.iter().skip(5).find_map(|row| number(row.split(separator).next()?.trim()));
+        match promised_frames("NumFrames", promised, frames.len()) {
+            Ok(remark) => remarks.extend(remark),
+            Err(_) if first.is_some_and(|first| first > 1.0) => remarks.push(format!(
+                "NumFrames counts {promised} frames, the file has {}: a part, for it begins with frame {}",
+                frames.len(),
+                first.unwrap_or_default()
+            )),
+            Err(reason) => return Err(RecordingError::Line { line: 3, reason }),
+        }
     }
     let has_rate = rate_hz.is_finite() && rate_hz > 0.0;
     if !has_rate {

@@ -258,6 +258,24 @@ mod tests {
                 21,
             ),
             (
+                "Hips LHipJoint LLeg LFoot LFoot_End RHipJoint RLeg RFoot RFoot_End Chest Neck Head Head_End LShoulder LArm LWrist \
+                 LWrist_End RShoulder RArm RWrist RWrist_End",
+                "bvh",
+                16,
+            ),
+            (
+                "root lhip lknee lankle ltoe ltoe_End rhip rknee rankle rtoe rtoe_End lowerback upperback chest lowerneck upperneck \
+                 upperneck_End lclavicle lshoulder lelbow lwrist rclavicle rshoulder relbow rwrist",
+                "bvh",
+                20,
+            ),
+            (
+                "Hips Spine Neck Head LShoulder LArm LForeArm LHand RShoulder RArm RForeArm RHand LUpLeg LLeg LFoot LToe RUpLeg \
+                 RLeg RFoot RToe",
+                "bvh",
+                18,
+            ),
+            (
                 "Ann:Hip Ann:Ab Ann:Chest Ann:Neck Ann:Head Ann:LShoulder Ann:LUArm Ann:LFArm Ann:LHand Ann:RShoulder Ann:RUArm \
                  Ann:RFArm Ann:RHand Ann:LThigh Ann:LShin Ann:LFoot Ann:LToe Ann:RThigh Ann:RShin Ann:RFoot Ann:RToe",
                 "bvh",

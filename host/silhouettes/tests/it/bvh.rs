@@ -133,7 +133,7 @@ fn feet_stay_under_the_body_and_the_caller_may_know_better() {
         // Hips at 17.6 units, legs of 16.6: an ankle is within 8 cm of a straight leg's reach.
         assert!((0.0..150.0).contains(&lowest) && joints["Head"][2] > 1200.0, "frame {frame}: {lowest}");
     }
-    let given = read(Choices { unit: Some(Unit { mm: 10.0 }), up: Some(Up::Z), person: None });
+    let given = read(Choices { unit: Some(Unit { mm: 10.0 }), up: Some(Up::Z), ..Choices::default() });
     assert_eq!(given.up.source, Source::Caller);
     assert!((given.by_name(0)["Hips"][1] - 176.0).abs() < 1e-9, "y of the file stays y");
 }

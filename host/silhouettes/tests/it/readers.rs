@@ -231,6 +231,31 @@ fn a_trc_file_without_a_rate_or_with_one_name_twice_is_reported() {
 }
 
 #[test]
+fn a_trc_file_of_a_part_of_a_recording_is_read_with_a_remark() {
+    let keys = TRC.replace("DataRate\tNumMarkers", "DataRate\tNumFrames\tNumMarkers");
+    let whole = keys.replace("\n100\t2", "\n100\t900\t2");
+    let part = whole.replace("\n1\t0\t", "\n185\t3.07\t").replace("\n2\t0.01\t", "\n186\t3.08\t");
+    let found = trc::read(part.as_bytes()).expect("a part");
+    assert_eq!(found.frames.len(), 2);
+    assert!(found.remarks[0].contains("900 frames, the file has 2: a part"), "{:?}", found.remarks);
+    assert!(trc::read(whole.as_bytes()).is_err(), "cut short");
+}
+
+#[test]
+fn a_trc_file_with_other_numbers_of_tabs_between_its_names_is_read() {
+    for names in ["A\t\t\t\tB", "A\t\tB", "\tA\t\t\tB"] {
+        let text = TRC.replace("A\t\t\tB", names);
+        assert_ne!(text, TRC);
+        let found = trc::read(text.as_bytes()).expect("a TRC file");
+        assert_eq!(
+            (found.names.as_slice(), found.remarks.len()),
+            (["A".to_owned(), "B".to_owned()].as_slice(), 0)
+        );
+        assert_eq!(found.frames[1][1], Some([4.0, 5.0, 6.0]));
+    }
+}
+
+#[test]
 fn a_trc_file_with_doubled_tabs_between_its_values_is_read() {
     let doubled = TRC.replace("\n100\t2\tm\n", "\n  100.0\t\t  2\t\t m\n");
     assert_ne!(doubled, TRC);

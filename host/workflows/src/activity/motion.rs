@@ -157,7 +157,7 @@ fn recorded(file: &MotionFile, request: &TrainRequest, context: &Context<'_>) ->
         return Err(MotionError::Activity { path: path.clone() }.into());
     };
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let choices = Choices { unit: request.units, up: request.up, person: None };
+    let choices = Choices { unit: request.units, up: request.up, person: None, aspect: request.aspect };
     let recording = markers::recording(path, choices)?;
     for remark in recording.remarks() {
         context.progress.warn(&format!("{}: {remark}", path.display()));

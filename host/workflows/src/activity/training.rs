@@ -8,7 +8,10 @@ use farnear_recognition::clip::{Clip, Track};
 use farnear_recognition::model::Recogniser;
 use farnear_recognition::space::{Map, PatternKind};
 use farnear_recognition::unknown::Limits;
-use farnear_silhouettes::readers::recording::{Unit, Up};
+use farnear_silhouettes::readers::{
+    keypoints::aspect::Aspect,
+    recording::{Unit, Up},
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_with::{DisplayFromStr, serde_as};
@@ -68,6 +71,10 @@ pub struct TrainRequest {
     #[cfg_attr(feature = "clap", arg(long, value_name = "UNIT"))]
     #[serde_as(as = "Option<DisplayFromStr>")]
     pub units: Option<Unit>,
+    /// Width and height of the picture, such as 9:16, for keypoints with coordinates from 0 to 1 [default: as the file states, or 16:9].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "WIDTH:HEIGHT"))]
+    #[serde_as(as = "Option<DisplayFromStr>")]
+    pub aspect: Option<Aspect>,
     /// Cameras that see every recording, 1 to 500.
     #[cfg_attr(feature = "clap", arg(long, value_name = "COUNT", default_value_t = Self::default().cameras))]
     pub cameras: usize,
@@ -93,6 +100,7 @@ impl Default for TrainRequest {
             template: None,
             up: None,
             units: None,
+            aspect: None,
             cameras: 24,
             method: MethodOptions::default(),
             window: None,
@@ -122,6 +130,7 @@ impl Request for TrainRequest {
             ("template", self.template.clone()),
             ("up", self.up.map(|up| up.to_string())),
             ("units", self.units.map(|unit| unit.to_string())),
+            ("aspect", self.aspect.map(|aspect| aspect.to_string())),
         ];
         if let Some((name, value)) = about_motion.into_iter().find_map(|(name, value)| Some((name, value?)))
             && self.motion.is_empty()

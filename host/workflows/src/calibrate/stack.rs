@@ -1,6 +1,7 @@
 //! Calibrates a lens file from one z-stack of a flat, textured target.
 
 mod plot;
+mod verdict;
 
 use std::{
     path::PathBuf,
@@ -11,10 +12,10 @@ use farnear_capture::record::read_record;
 use farnear_depth::{
     calibrate::stack::{AtDepth, LENSES, Moved, StackError, StackLens, StackSettings, calibrate_stack},
     mosaic::{self, is_mosaic},
-    optics::{Optics, RESPONSE_POINTS, Stage},
+    optics::{Optics, Stage},
 };
 use farnear_files::{
-    image_file::{Grey, ReadSettings, SharedWhiteLevel, relative},
+    image_file::{Grey, ReadSettings, Samples, SharedWhiteLevel, relative},
     order, stack, staging,
 };
 use ndarray::Array2;
@@ -31,19 +32,12 @@ use crate::{
     plot::Format,
     request::{PathKind, Request},
 };
+pub use verdict::verdict;
 
 /// Largest difference of a step from the usual one, relative to it.
 const EVEN: f64 = 0.1;
 /// Largest difference of the given step from the stated one, relative to it.
 const SAME_STEP: f64 = 0.02;
-/// Share of errors within three standard deviations for the verdict `good`.
-const HONEST: f64 = 0.97;
-/// Least share of pixels with a depth.
-const FILLED: f64 = 0.9;
-/// Largest RMS error relative to the range. Real and simulated lenses have 0.01 to 0.03.
-const ROUGH: f64 = 0.05;
-/// Least span of the response in normalised depth, of 2.
-const LEARNED: f64 = 1.2;
 
 /// Calibrate a lens from a z-stack of a flat, textured target (tilted or not), slices one stage step apart.
 ///
@@ -89,6 +83,9 @@ pub struct CalibrateStackRequest {
     /// Code at which the camera saturates, such as 4095 for 12 bits in 16 [default: from the files].
     #[cfg_attr(feature = "clap", arg(long, value_name = "CODE"))]
     pub white_level: Option<u32>,
+    /// Folder with the camera's dark and flat frames, from `farnear calibrate camera`.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
+    pub camera_frames: Option<PathBuf>,
     /// File for a plot of blur, response and errors: .svg or .png.
     #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub plot: Option<PathBuf>,
@@ -109,6 +106,7 @@ impl Default for CalibrateStackRequest {
             near_first: false,
             grey: Grey::default(),
             white_level: None,
+            camera_frames: None,
             plot: None,
             out: PathBuf::new(),
         }
@@ -118,8 +116,12 @@ impl Default for CalibrateStackRequest {
 impl Request for CalibrateStackRequest {
     const NAME: &'static str = "calibrate stack";
     const REQUIRED: &'static [&'static str] = &["stack", "out"];
-    const PATHS: &'static [(&'static str, PathKind)] =
-        &[("stack", PathKind::Input), ("out", PathKind::OutputFile), ("plot", PathKind::OutputFile)];
+    const PATHS: &'static [(&'static str, PathKind)] = &[
+        ("stack", PathKind::Input),
+        ("camera_frames", PathKind::Input),
+        ("out", PathKind::OutputFile),
+        ("plot", PathKind::OutputFile),
+    ];
     type Figures = StackFigures;
 
     fn run(&self, context: &Context<'_>) -> Result<StackFigures> {
@@ -329,6 +331,7 @@ fn read(
     context: &Context<'_>,
 ) -> Result<(Vec<Array2<f32>>, f64)> {
     let settings = ReadSettings { grey: request.grey, white_level: request.white_level };
+    let frames = request.camera_frames.as_deref().map(|folder| context.cache.camera(folder)).transpose()?;
     let mut slices = Vec::with_capacity(images.len());
     let mut white = SharedWhiteLevel::default();
     let (mut coding, mut filled) = (0.0, 0);
@@ -336,6 +339,18 @@ fn read(
         context.cancel.check("reading the slices")?;
         context.progress.advance("slices", index + 1, Some(images.len()));
         white.add(&image);
+        if let Some(frames) = &frames {
+            let clipped = match image.samples {
+                Samples::Integer(_) => image.white_level.unwrap_or(1.0),
+                Samples::Float => f32::INFINITY,
+            };
+            let seen = frames.correct(image.pixels.view())?;
+            image.pixels.zip_mut_with(&seen, |value, seen| {
+                if *value < clipped {
+                    *value = seen.min(clipped);
+                }
+            });
+        }
         filled += fill_specks(&mut image.pixels).len();
         let holes = image.pixels.iter().filter(|value| !value.is_finite()).count();
         if holes > 0 {
@@ -402,7 +417,7 @@ fn figures(
         blur_per_slice_px: blur.per_slice_px.map(|blur| rounded(blur, 3)),
         blur: blur.points.iter().map(|p| [p.slices, p.radius_px].map(|value| rounded(value, 3))).collect(),
         blur_floor_px: stage.blur_floor_px,
-        learned_mm: of_range(0.5 * learned(found) * range_mm),
+        learned_mm: of_range(0.5 * verdict::learned(found) * range_mm),
         robust_mm: of_error(held_out.robust_mm),
         rms_mm: of_error(held_out.rms_mm),
         bias_mm: of_error(held_out.bias_mm),
@@ -424,67 +439,6 @@ fn figures(
             })
             .collect(),
     }
-}
-
-/// `good`, or what to change.
-pub fn verdict(found: &StackLens) -> String {
-    let held_out = &found.held_out;
-    if let Some(pair) = found.exchanged.first() {
-        let [one, other] = pair.map(|slice| slice + 1);
-        return format!(
-            "slices {one} and {other} look exchanged, or one of them is defocused: in this order sharpness rises and falls more than \
-             once; exchange them, or take the stack again"
-        );
-    }
-    let foreign: Vec<String> = found.foreign.iter().map(|slice| (slice + 1).to_string()).collect();
-    if !foreign.is_empty() {
-        return format!(
-            "slice {} does not fit the others: is it defocused, moved or of something else? Take the stack again",
-            foreign.join(" or ")
-        );
-    }
-    let learned = learned(found);
-    if learned < LEARNED {
-        return format!(
-            "only {:.0} % of the range of a pair was learned, depths outside that part are left out: take more slices around the focus, \
-             or tilt the target",
-            50.0 * learned
-        );
-    }
-    if held_out.fill < FILLED {
-        return format!(
-            "only {:.0} % of the target has a depth: use a target with more fine texture, more light or a finer step",
-            100.0 * held_out.fill
-        );
-    }
-    let range = found.optics.working_range();
-    let error = held_out.rms_mm / (range.far_mm - range.near_mm);
-    if error > ROUGH {
-        return format!(
-            "the error is {:.0} % of the range of a pair: look for slices that are missing, moved or out of order, and check that the \
-             stage's steps are even and the target is flat",
-            100.0 * error
-        );
-    }
-    if !(0.9..=1.1).contains(&held_out.slope) {
-        return format!(
-            "measured depth changes {:.2} times as much as the stage moves: take a finer step or more slices around the focus",
-            held_out.slope
-        );
-    }
-    if held_out.within_three < HONEST {
-        return format!(
-            "{:.0} % of the errors are within three predicted standard deviations, 97 % are expected: check that the target is flat \
-             and the stage's steps are even",
-            100.0 * held_out.within_three
-        );
-    }
-    "good".into()
-}
-
-/// Normalised depth, of 2, that the response spans.
-fn learned(found: &StackLens) -> f64 {
-    found.optics.stage().map_or(2.0, |stage| stage.response[RESPONSE_POINTS - 1] - stage.response[0])
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 //! into runs. The longest run is the scene. A frame outside belongs to it if it correlates with one of the two nearest
 //! frames of the scene as frames of the scene at the same distance do; so the good neighbour of a bad frame stays. A
 //! shaken frame correlates, but is less sharp than its neighbours allow ([`shaken`]). Where neighbours correlate
-//! little, no frame is judged.
+//! little, no frame is judged. A picture that another program composed of the frames is left out before.
 
 mod shaken;
 #[cfg(test)]
@@ -52,6 +52,8 @@ pub(super) struct Frames {
     pub untold: Vec<usize>,
     /// Images that look exchanged.
     pub exchanged: Vec<[usize; 2]>,
+    /// The image at which the order should begin; none is left out then.
+    pub wrapped: Option<usize>,
     /// Usual correlation of neighbours; `None` if it was not measured.
     pub usual: Option<f64>,
     /// Farthest displacement of a corner over the stack without alignment, px.
@@ -62,7 +64,21 @@ impl Frames {
     pub fn unchecked(count: usize) -> Self {
         let (warps, gains) = (vec![Warp::IDENTITY; count], vec![1.0; count]);
         let (left_out, untold, exchanged) = (Vec::new(), Vec::new(), Vec::new());
-        Self { warps, gains, left_out, untold, exchanged, usual: None, drift_px: 0.0 }
+        Self { warps, gains, left_out, untold, exchanged, wrapped: None, usual: None, drift_px: 0.0 }
+    }
+
+    /// Adds an image that is none of the stack's own.
+    fn insert_composed(&mut self, composed: usize) {
+        let left_out = self.left_out.iter_mut().map(|(index, _)| index);
+        let others =
+            self.untold.iter_mut().chain(self.exchanged.iter_mut().flatten()).chain(&mut self.wrapped);
+        left_out.chain(others).filter(|index| **index >= composed).for_each(|index| *index += 1);
+        self.warps.insert(composed, Warp::IDENTITY);
+        self.gains.insert(composed, 1.0);
+        let reason = "it is sharper than its place in the stack allows, in all parts: an all-in-focus picture, of another scene, or out \
+                      of order";
+        self.left_out.push((composed, reason.into()));
+        self.left_out.sort_by_key(|(index, _)| *index);
     }
 
     /// All warnings; `name` gives the name of an image.
@@ -85,6 +101,14 @@ impl Frames {
                  wrong: exchange them or correct the positions (--positions-um)"
             ));
         }
+        remarks.extend(self.wrapped.map(|first| {
+            format!(
+                "the order looks wrapped: sharpness rises and falls once only if the stack begins with {}; in the order given depth is \
+                 wrong, and bad images are not recognised: number the images in the order of their focus, or correct the positions \
+                 (--positions-um)",
+                name(first)
+            )
+        }));
         let left_out = self.left_out.iter();
         remarks.extend(left_out.map(|(index, reason)| format!("left out {}: {reason}", name(*index))));
         remarks
@@ -102,7 +126,7 @@ impl Frames {
         if self.drift_px > DRIFT_PX {
             warnings.push(format!(
                 "the images move by {:.1} px over the stack (a breathing lens or a moving camera), so depth is wrong at edges: use \
-                 --align similarity",
+                 --align similarity; not for transparent objects (phase contrast, bright field), whose detail changes with the focus",
                 self.drift_px
             ));
         }
@@ -144,69 +168,20 @@ where
     WorkflowError: From<S::Error>,
 {
     let count = images.count();
-    let mut frames = Frames::unchecked(count);
     // Stacks that are too short or of mixed sizes are refused by the measure.
     if count < 3 || (1..count).any(|index| images.dim(index) != images.dim(0)) {
-        return Ok(frames);
+        return Ok(Frames::unchecked(count));
     }
-    let comparison = Comparison { images, model, context };
-    let mut neighbours = comparison.neighbours()?;
-    let registered = usual(neighbours.links.iter().map(|link| link.registered));
-    if model.is_none() {
-        // The warps tell only the motion, and a link to a foreign frame tells none.
-        let foreign = neighbours.links.iter_mut().filter(|link| link.registered < FOREIGN * registered);
-        foreign.for_each(|link| link.warp = Warp::IDENTITY);
-    }
-    let scene = comparison.scene(&neighbours.links)?;
-    let members: Vec<usize> = (0..count).filter(|index| scene.warps[*index].is_some()).collect();
-    frames.gains = brightness::gains(&neighbours.brightness, &members);
-    // Next to an unknown foreign frame a good one looks shaken.
-    let shaken = if scene.usual > TELLING {
-        shaken::find(&neighbours.sharpness, positions, &frames.gains, &members)
-    } else {
-        shaken::Shaken::default()
+    let mut comparison = Comparison { images, chosen: (0..count).collect(), model, context };
+    let neighbours = comparison.neighbours()?;
+    let Some(composed) = slice_order::composed(&neighbours.sharpness) else {
+        return comparison.judged(neighbours, positions);
     };
-    // Half or more: it is not the frames that are wrong.
-    let few_foreign = (count - members.len()) * 2 < count;
-    let few_shaken = shaken.frames.len() * 4 < count;
-    let start = members.iter().min_by_key(|index| index.abs_diff(count / 2));
-    let back = start.and_then(|start| scene.warps[*start]?.inverse()).unwrap_or(Warp::IDENTITY);
-    for index in 0..count {
-        let warp = match scene.warps[index] {
-            Some(warp) => warp,
-            None => {
-                let (nearest, warp) = nearest(&scene.warps, index).next().unwrap_or((index, Warp::IDENTITY));
-                let link = comparison.link(nearest, index)?;
-                if few_foreign {
-                    let reason = format!(
-                        "it shows another scene, or is turned, black or far out of focus (correlation with its neighbour {:.2}, of the others {:.2})",
-                        link.correlation, scene.usual
-                    );
-                    frames.left_out.push((index, reason));
-                }
-                link.warp.after(&warp)
-            }
-        };
-        frames.warps[index] = warp.after(&back);
-        if few_shaken && shaken.frames.contains(&index) {
-            let reason = "it is shaken or defocused: less sharp in most places than its neighbours suggest";
-            frames.left_out.push((index, reason.into()));
-        }
-    }
-    frames.untold = shaken.untold;
-    let of_scene: Vec<Vec<f64>> = members.iter().map(|index| neighbours.sharpness[*index].clone()).collect();
-    let exchanged = slice_order::exchanged(&of_scene);
-    frames.exchanged = exchanged.into_iter().map(|pair| pair.map(|index| members[index])).collect();
-    frames.usual = Some(scene.usual);
-    if model.is_none() {
-        // In place, moving images correlate little.
-        let is_apart = scene.usual < FOREIGN * registered;
-        if registered > TELLING || is_apart && comparison.steps_agree(&neighbours.links)? {
-            let measured: Vec<Warp> = members.iter().map(|index| frames.warps[*index]).collect();
-            frames.drift_px = farthest_px(&measured, images.dim(0));
-        }
-        frames.warps.fill(Warp::IDENTITY);
-    }
+    comparison.chosen.remove(composed);
+    let mut positions = positions.to_vec();
+    positions.remove(composed);
+    let mut frames = comparison.judged(comparison.neighbours()?, &positions)?;
+    frames.insert_composed(composed);
     Ok(frames)
 }
 
@@ -244,6 +219,8 @@ struct Neighbours {
 
 struct Comparison<'a, S: ?Sized> {
     images: &'a S,
+    /// Numbers of the images that are compared.
+    chosen: Vec<usize>,
     model: Option<Model>,
     context: &'a Context<'a>,
 }
@@ -265,6 +242,7 @@ where
 {
     fn image(&self, index: usize) -> Result<CowArray<'_, f32, Ix2>> {
         self.context.cancel.check("comparing the stack's images")?;
+        let index = self.chosen[index];
         Ok(self.images.rows(index, 0..self.images.dim(index).0)?)
     }
 
@@ -285,7 +263,7 @@ where
     }
 
     fn neighbours(&self) -> Result<Neighbours> {
-        let count = self.images.count();
+        let count = self.chosen.len();
         let mut found = Neighbours { links: Vec::new(), sharpness: Vec::new(), brightness: Vec::new() };
         let mut before: Option<CowArray<'_, f32, Ix2>> = None;
         for index in 0..count {
@@ -297,6 +275,77 @@ where
             self.context.progress.advance("images compared", index + 1, Some(count));
         }
         Ok(found)
+    }
+
+    /// Finds the frames to leave out and the warps of the others.
+    fn judged(&self, mut neighbours: Neighbours, positions: &[f64]) -> Result<Frames> {
+        let count = self.chosen.len();
+        let mut frames = Frames::unchecked(count);
+        let registered = usual(neighbours.links.iter().map(|link| link.registered));
+        if self.model.is_none() {
+            // The warps tell only the motion, and a link to a foreign frame tells none.
+            let foreign = neighbours.links.iter_mut().filter(|link| link.registered < FOREIGN * registered);
+            foreign.for_each(|link| link.warp = Warp::IDENTITY);
+        }
+        let scene = self.scene(&neighbours.links)?;
+        let members: Vec<usize> = (0..count).filter(|index| scene.warps[*index].is_some()).collect();
+        frames.gains = brightness::gains(&neighbours.brightness, &members);
+        // Next to an unknown foreign frame a good one looks shaken.
+        let shaken = if scene.usual > TELLING {
+            shaken::find(&neighbours.sharpness, positions, &frames.gains, &members)
+        } else {
+            shaken::Shaken::default()
+        };
+        // Half or more: it is not the frames that are wrong.
+        let few_foreign = (count - members.len()) * 2 < count;
+        let few_shaken = shaken.frames.len() * 4 < count;
+        let start = members.iter().min_by_key(|index| index.abs_diff(count / 2));
+        let back = start.and_then(|start| scene.warps[*start]?.inverse()).unwrap_or(Warp::IDENTITY);
+        for index in 0..count {
+            let warp = match scene.warps[index] {
+                Some(warp) => warp,
+                None => {
+                    let (nearest, warp) =
+                        nearest(&scene.warps, index).next().unwrap_or((index, Warp::IDENTITY));
+                    let link = self.link(nearest, index)?;
+                    if few_foreign {
+                        let reason = format!(
+                            "it shows another scene, or is turned, black or far out of focus (correlation with its neighbour {:.2}, of the others {:.2})",
+                            link.correlation, scene.usual
+                        );
+                        frames.left_out.push((index, reason));
+                    }
+                    link.warp.after(&warp)
+                }
+            };
+            frames.warps[index] = warp.after(&back);
+            if few_shaken && shaken.frames.contains(&index) {
+                let reason =
+                    "it is shaken or defocused: less sharp in most places than its neighbours suggest";
+                frames.left_out.push((index, reason.into()));
+            }
+        }
+        frames.untold = shaken.untold;
+        let of_scene: Vec<Vec<f64>> =
+            members.iter().map(|index| neighbours.sharpness[*index].clone()).collect();
+        let exchanged = slice_order::exchanged(&of_scene);
+        frames.exchanged = exchanged.into_iter().map(|pair| pair.map(|index| members[index])).collect();
+        frames.usual = Some(scene.usual);
+        if self.model.is_none() {
+            // In place, moving images correlate little.
+            let is_apart = scene.usual < FOREIGN * registered;
+            if registered > TELLING || is_apart && self.steps_agree(&neighbours.links)? {
+                let measured: Vec<Warp> = members.iter().map(|index| frames.warps[*index]).collect();
+                frames.drift_px = farthest_px(&measured, self.images.dim(0));
+            }
+            frames.warps.fill(Warp::IDENTITY);
+        }
+        let wrapped = slice_order::wrapped(&neighbours.sharpness);
+        if wrapped.is_some() && self.link(count - 1, 0)?.registered >= FOREIGN * registered {
+            frames =
+                Frames { wrapped, left_out: Vec::new(), untold: Vec::new(), exchanged: Vec::new(), ..frames };
+        }
+        Ok(frames)
     }
 
     /// Whether most pairs of successive steps lead to where the image after next is.

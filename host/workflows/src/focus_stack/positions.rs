@@ -69,7 +69,11 @@ pub(super) fn of(request: &FocusStackRequest) -> Result<Listed> {
     let object_pixel_um = listed.object_pixel_um;
     if positions.len() != images.len() {
         let expected = format!("one for each of the {} images is needed", images.len());
-        let name = if axis == Axis::StageUm { "positions-um" } else { "distances-mm" };
+        let name = match (axis, &request.sensor_mm) {
+            (Axis::StageUm, _) => "positions-um",
+            (_, Some(_)) => "sensor-mm",
+            _ => "distances-mm",
+        };
         return Err(WorkflowError::parameter(name, format!("({} numbers)", positions.len()), expected));
     }
     let mut order: Vec<(f64, PathBuf)> = positions.into_iter().zip(images).collect();

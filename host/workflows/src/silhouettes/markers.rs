@@ -16,6 +16,7 @@ use farnear_recognition::clip::Track;
 use farnear_silhouettes::mask::Mask;
 use farnear_silhouettes::readers::{
     self,
+    keypoints::aspect::Aspect,
     recording::{Choices, Recording, Unit, Up},
 };
 use farnear_silhouettes::silhouette::{
@@ -111,6 +112,11 @@ pub struct MarkersRequest {
     /// Person in a file with several, from 1 [default: the one who moves or is visible most, or whose markers are first].
     #[cfg_attr(feature = "clap", arg(long, value_name = "NUMBER"))]
     pub person: Option<usize>,
+    /// Width and height of the picture, such as 9:16 or 1080x1920, for keypoints with coordinates from 0 to 1 [default: as the file
+    /// states, or 16:9].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "WIDTH:HEIGHT"))]
+    #[serde_as(as = "Option<DisplayFromStr>")]
+    pub aspect: Option<Aspect>,
     /// Write masks of 100x100 pixels with the subject centred, instead of full frames.
     #[cfg_attr(feature = "clap", arg(long))]
     pub centred: bool,
@@ -141,6 +147,7 @@ impl Default for MarkersRequest {
             up: None,
             units: None,
             person: None,
+            aspect: None,
             centred: false,
             keep: None,
             samples: None,
@@ -188,7 +195,7 @@ pub struct Performer {
 
 impl MarkersRequest {
     fn choices(&self) -> Choices {
-        Choices { unit: self.units, up: self.up, person: self.person }
+        Choices { unit: self.units, up: self.up, person: self.person, aspect: self.aspect }
     }
 
     fn performer(&self) -> Option<Performer> {

@@ -1,4 +1,4 @@
-//! Estimates the unit and up axis of a BVH file from the joints `head` and `foot`, `ankle` or `toe`. Some writers keep
+//! Estimates the unit and up axis of a BVH file from the joints `head` (or `upperneck`) and `foot`, `ankle` or `toe`. Some writers keep
 //! all bones along one axis, so that the rest pose folds head and feet to one side of the hips; then the frames give
 //! the up axis. Lengths along bones are valid in every pose.
 
@@ -38,7 +38,8 @@ impl Body {
         let longest = |among: Vec<usize>| {
             among.into_iter().max_by(|&a, &b| length(joints, a).total_cmp(&length(joints, b)))
         };
-        let head = longest(named(&["head"])).ok_or("no joint is named head")?;
+        let head = longest(named(&["head"])).or_else(|| longest(named(&["upperneck"])));
+        let head = head.ok_or("no joint is named head")?;
         let feet = named(&["foot", "ankle", "toe"]);
         if feet.is_empty() {
             return Err("no joint is named foot, ankle or toe");
@@ -287,9 +288,11 @@ mod tests {
         let found = up(&motion, &Kinematics::new(&motion));
         assert!(found.value == Up::Y && !sure(&found), "{found:?}");
         // The missing joints are named.
-        for (root, missing) in
-            [("a", "no joint is named head"), ("head", "no joint is named foot, ankle or toe")]
-        {
+        for (root, missing) in [
+            ("a", "no joint is named head"),
+            ("head", "no joint is named foot, ankle or toe"),
+            ("upperneck", "no joint is named foot, ankle or toe"),
+        ] {
             let motion = parse(&text.replace("ROOT a", &format!("ROOT {root}"))).expect("a BVH file");
             let found = [unit(&motion.joints).source, up(&motion, &Kinematics::new(&motion)).source];
             for source in found {

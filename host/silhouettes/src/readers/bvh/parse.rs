@@ -112,7 +112,8 @@ fn hierarchy(cursor: &mut Cursor) -> Result<Vec<Joint>, RecordingError> {
             Some((joint, _)) if is("JOINT") || is("End") => {
                 let parent = *joint;
                 let name = if is("End") {
-                    cursor.expect("Site")?;
+                    // `Site`; some programs write a name.
+                    cursor.name("Site")?;
                     format!("{}_End", joints[parent].name)
                 } else {
                     cursor.name("the joint's name")?
@@ -440,6 +441,7 @@ mod tests {
             (".025", "0,025"),
             ("6 7 8 9 1e1", "6,0 7 8 9 1,0e1"),
             ("Frame Time:", "Frame\tTime :"),
+            ("End Site", "End l_toes"),
             ("0 -4 0.5", "0 -4 5e-1"),
         ] {
             assert_eq!(parse(&SMALL.replacen(from, to, 1)), Ok(good.clone()), "{to}");

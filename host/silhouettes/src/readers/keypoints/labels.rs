@@ -5,8 +5,8 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 use serde_json::Value;
 
 use super::{
-    document::{Person, Raw},
     layouts::{Layout, NAMED, NAMES},
+    points::{Person, Raw},
     spatial,
 };
 use crate::{readers::recording::RecordingError, silhouette::aliases};
@@ -15,7 +15,7 @@ const KEYS: [&str; 3] = ["name", "part", "id"];
 /// Points of COCO, the usual layout of programs that leave points out.
 const USUAL: usize = 17;
 /// Fewer numbers are not those of a body.
-const LEAST: usize = 6;
+pub const LEAST: usize = 6;
 
 struct Order {
     layout: &'static Layout,

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, HashSet};
 
-use super::{document::Person, layouts::NAMES};
+use super::{layouts::NAMES, points::Person};
 use crate::silhouette::capsule::Point3;
 
 pub type Track = Vec<Vec<Option<Point3>>>;

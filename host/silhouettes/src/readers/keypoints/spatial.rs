@@ -1,13 +1,13 @@
 //! Keypoints in three dimensions: whether a file's third numbers are coordinates, and the order of its points.
 
 use super::{
-    document::{Person, Raw},
-    layouts::{HUMAN36M, Layout, NAMED},
+    layouts::{HUMAN36M, Layout, NAMED, NAMES},
+    points::{Person, Raw},
 };
 use crate::{readers::recording::RecordingError, silhouette::capsule::Point3};
 
 /// Confidences exceed 1 slightly in some programs.
-const HIGHEST_CONFIDENCE: f64 = 1.2;
+pub const HIGHEST_CONFIDENCE: f64 = 1.2;
 /// Share of points outside the range of confidences, or of the picture.
 const LEAST_SHARE: f64 = 0.05;
 const MOST_ASYMMETRY: f64 = 0.25;
@@ -28,6 +28,35 @@ pub fn are_centred<'a>(people: impl Iterator<Item = &'a Person>) -> bool {
     share(&seen(people), |point| point.x < 0.0 || point.y < 0.0) >= SHARE
 }
 
+/// Depths of a body are about as large as its other coordinates, scores next to pixels are not.
+fn are_flat<'a>(people: impl Iterator<Item = &'a Person>) -> bool {
+    const MOST: f64 = 0.05;
+    let is_flat = |person: &Person| {
+        let points: Vec<Point3> = person.raw.iter().filter_map(Raw::in_space).collect();
+        let reach = |k: usize| {
+            let values = || points.iter().map(|point| point[k]);
+            values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
+        };
+        (points.len() > 1).then(|| reach(2) <= MOST * reach(0).max(reach(1)))
+    };
+    let known: Vec<bool> = people.filter_map(is_flat).collect();
+    2 * known.iter().filter(|flat| **flat).count() > known.len()
+}
+
+/// Depths of named points about the middle of the hips, as MediaPipe has them.
+fn are_about_the_hips<'a>(people: impl Iterator<Item = &'a Person>) -> bool {
+    const MOST: f64 = 0.01;
+    let place = |name: &str| NAMES.iter().position(|known| *known == name);
+    let is_about = |person: &Person| {
+        let depth = |place: usize| person.raw.get(place)?.in_space().map(|point| point[2]);
+        let middle = 0.5 * (depth(place("left hip")?)? + depth(place("right hip")?)?);
+        let furthest = (0..NAMES.len()).filter_map(depth).fold(0.0, |most: f64, z| most.max(z.abs()));
+        Some(furthest > 0.0 && middle.abs() <= MOST * furthest)
+    };
+    let known: Vec<bool> = people.filter_map(is_about).collect();
+    2 * known.iter().filter(|about| **about).count() > known.len()
+}
+
 pub fn has_depth<'a>(people: impl Iterator<Item = &'a Person> + Clone) -> bool {
     if people.clone().any(|person| person.layout.has_picture_depth()) {
         return are_centred(people);
@@ -42,10 +71,11 @@ pub fn has_depth<'a>(people: impl Iterator<Item = &'a Person> + Clone) -> bool {
     // A body in metres would be longer. These are shares of a picture, as of MediaPipe, or about the hips.
     let is_near =
         |point: &Raw| point.in_space().is_some_and(|point| point.iter().all(|value| value.abs() <= 1.0));
-    let are_near =
-        people.clone().all(|person| *person.layout == NAMED) && share(&thirds, is_near) >= 1.0 - LEAST_SHARE;
+    let are_near = people.clone().all(|person| *person.layout == NAMED)
+        && (share(&thirds, is_near) >= 1.0 - LEAST_SHARE || are_about_the_hips(people.clone()));
     share(&thirds, |point| !is_visibility(point)) >= LEAST_SHARE
         && share(&thirds, is_outside) >= LEAST_SHARE
+        && !are_flat(people.clone())
         && (!are_near || are_centred(people))
 }
 

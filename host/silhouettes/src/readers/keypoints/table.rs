@@ -1,14 +1,16 @@
 //! Keypoints in a table: columns of x, y and perhaps a confidence for each named point, as SLEAP (`nose.x`) and MocapNET
-//! (`2DX_neck`) write them, and DeepLabCut in rows of names that the CSV reader joins (`nose_x`, `Ann:nose_x`).
+//! (`2DX_neck`) write them, and DeepLabCut in rows of names that the CSV reader joins (`nose_x`, `Ann:nose_x`); or for each
+//! numbered point (`x1`, `y1`, `z1`, `v1`; `landmark_0_x`).
 
 use std::collections::HashMap;
 
 use csv::StringRecord;
 
 use super::{
-    document::{Document, Person, Raw},
+    document::Document,
     found,
-    layouts::NAMES,
+    layouts::{Layout, NAMES},
+    points::{Person, Raw},
     spatial,
 };
 use crate::{
@@ -39,18 +41,26 @@ pub fn read(
     rows: &[StringRecord],
     choices: Choices,
 ) -> Result<Option<Found>, RecordingError> {
-    let has_z = columns.iter().any(|column| coordinate(column).is_some_and(|(_, axis)| axis == 2));
     let is_point = |name: &str| columns.iter().filter_map(coordinate).any(|(own, _)| own == name);
     // One kind counts: some tables have a score and a visibility of each point.
     let kind = columns.iter().filter_map(confidence).find_map(|(name, kind)| is_point(name).then_some(kind));
-    let points: Vec<Column> = markers_of::<4>(columns, |column| field(column, kind))?
+    let markers = markers_of::<4>(columns, |column| field(column, kind))?;
+    let has_z = markers.iter().any(|(_, [_, _, depth, _])| depth.is_some());
+    let points: Vec<Column> = markers
         .into_iter()
         .filter_map(|(name, [x, y, depth, sure])| Some(Column { name, place: [x?, y?], depth, sure }))
         .collect();
     if points.is_empty() {
         return Ok(None);
     }
-    let bodies = bodies(&points);
+    let mut bodies = bodies(&points);
+    let mut numbers = Vec::new();
+    if bodies.is_empty()
+        && let Some(found) = numbers_of(&points)
+    {
+        numbers = found;
+        bodies.push(("", points.iter().enumerate().collect()));
+    }
     let known: usize = bodies.iter().map(|(_, body)| body.len()).sum();
     if known == 0 && has_z {
         return Ok(None);
@@ -74,7 +84,7 @@ pub fn read(
         let track = track.map_or("", |column| cell(row, column));
         let mut people = Vec::new();
         for (prefix, body) in &bodies {
-            let mut raw = vec![Raw::MISSING; NAMES.len()];
+            let mut raw = vec![Raw::MISSING; if numbers.is_empty() { NAMES.len() } else { points.len() }];
             for (place, column) in body {
                 let [x, y] = column.place.map(|column| cell(row, column));
                 if let Some([x, y, _]) = point([x, y, "0"], line(row))? {
@@ -89,12 +99,12 @@ pub fn read(
             let next = ids.len() as i64;
             let is_named = !(track.is_empty() && prefix.is_empty());
             let id = is_named.then(|| *ids.entry((track, *prefix)).or_insert(next));
-            people.push(Person::named(raw, id));
+            people.push(Person { labels: numbers.clone(), ..Person::named(raw, id) });
         }
         let name = frame.map_or_else(|| index.to_string(), |column| cell(row, column).to_owned());
         frames.push((name, people));
     }
-    if has_z && spatial::has_depth(frames.iter().flat_map(|(_, people)| people)) {
+    if has_z && numbers.is_empty() && spatial::has_depth(frames.iter().flat_map(|(_, people)| people)) {
         return Ok(None);
     }
     if frames.is_empty() {
@@ -109,8 +119,8 @@ pub fn read(
         return Err(RecordingError::Line { line: 1, reason });
     }
     let ignored = if has_z { "; their z is taken as a depth next to a picture and ignored" } else { "" };
-    let about = format!("{known} of {} named points are keypoints{ignored}", points.len());
-    found(Document::of_frames(frames), choices, Some(about)).map(Some)
+    let about = || format!("{known} of {} named points are keypoints{ignored}", points.len());
+    found(Document::of_frames(frames), choices, numbers.is_empty().then(about)).map(Some)
 }
 
 fn cell(row: &StringRecord, column: usize) -> &str {
@@ -137,6 +147,20 @@ fn body<'a>(points: &'a [Column], prefix: &str) -> Body<'a> {
     known.filter_map(|(at, name)| Some((place(&name)?, *own.get(at)?))).collect()
 }
 
+/// Numbers after a text that all names share, of as many points as a layout has. Numbered points in space without confidences
+/// are markers.
+fn numbers_of(points: &[Column]) -> Option<Vec<String>> {
+    Layout::of(points.len())
+        .filter(|_| points.iter().all(|point| point.depth.is_none() || point.sure.is_some()))?;
+    let parts = |point: &Column| {
+        let text = point.name.trim_end_matches(|c: char| c.is_ascii_digit());
+        (text.to_owned(), point.name[text.len()..].to_owned())
+    };
+    let (texts, numbers): (Vec<String>, Vec<String>) = points.iter().map(parts).unzip();
+    let are_alike = texts.windows(2).all(|two| two[0] == two[1]);
+    (are_alike && numbers.iter().all(|number| !number.is_empty())).then_some(numbers)
+}
+
 /// Name of a point, and the kind of its confidence.
 fn confidence(column: &str) -> Option<(&str, &'static str)> {
     let (name, last) = column.rsplit_once(['_', ':', '.', ' '])?;
@@ -144,7 +168,7 @@ fn confidence(column: &str) -> Option<(&str, &'static str)> {
     Some((name, kind))
 }
 
-/// Name of a point, and 0 for x, 1 for y, 2 for z, 3 for the confidence of this kind.
+/// Name of a point, and 0 for x, 1 for y, 2 for z, 3 for the confidence of this kind, or for `v1` of a numbered point.
 fn field<'a>(column: &'a str, kind: Option<&str>) -> Option<(&'a str, usize)> {
     let mocapnet = MOCAPNET.iter().zip([0, 1, 3]).find_map(|(start, axis)| {
         let (begin, name) = column.split_at_checked(start.len())?;
@@ -154,7 +178,14 @@ fn field<'a>(column: &'a str, kind: Option<&str>) -> Option<(&'a str, usize)> {
         let (name, own) = confidence(column)?;
         (Some(own) == kind).then_some((name, 3))
     };
-    mocapnet.or_else(|| coordinate(column)).or_else(sure)
+    let numbered = || {
+        let axis =
+            ['x', 'y', 'z', 'v'].iter().position(|axis| column.to_ascii_lowercase().starts_with(*axis))?;
+        let number = column[1..].trim_start_matches('_');
+        let is_number = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
+        is_number.then_some((number, axis))
+    };
+    mocapnet.or_else(|| coordinate(column)).or_else(sure).or_else(numbered)
 }
 
 #[cfg(test)]
@@ -299,6 +330,56 @@ mod tests {
         let row = cells(|_, [x, y]| format!("{},0.3,{}", x / 200.0, (190.0 - y) / 100.0));
         let found = read(&format!("frame{header}\n0{row}\n"), None).expect("markers");
         assert!(!found.planar && (found.by_name(0)["nose"][2] - 1600.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn depths_about_the_hips_of_a_person_near_the_camera_are_ignored() {
+        let depth = |name: &str, y: f64| match name {
+            "left_hip" => 0.1,
+            "right_hip" => -0.1,
+            _ => (y - 100.0) / 40.0,
+        };
+        let header = cells(|name, _| format!("{name}_x,{name}_y,{name}_z"));
+        let row = cells(|name, [x, y]| format!("{},{},{}", x / 320.0, y / 200.0, depth(name, y)));
+        expect_person(&format!("frame{header}\n0{row}\n1{row}\n"), 2);
+    }
+
+    #[test]
+    fn tables_of_numbered_points_are_read_in_the_order_of_a_layout() {
+        let place = |name: Option<usize>| {
+            let name = NAMES[name?].replace(' ', "_");
+            BODY.iter().find(|(known, _)| *known == name).map(|(_, place)| *place)
+        };
+        let places: Vec<[f64; 2]> = Layout::of(33)
+            .expect("MediaPipe's")
+            .places()
+            .map(|name| place(name).unwrap_or_default())
+            .collect();
+        let row = places.iter().map(|[x, y]| format!(",{},{},-0.3,0.9", x / 320.0, y / 200.0));
+        let row: String = row.collect();
+        let columns: [fn(usize, &str) -> String; 4] = [
+            |n, field| format!("{}{}", &field[..1], n + 1),
+            |n, field| format!("{}_{n}", &field[..1]),
+            |n, field| format!("L{n}_{field}"),
+            |n, field| format!("landmark_{n}_{field}"),
+        ];
+        for column in columns {
+            let fields = (0..33).flat_map(|n| ["x", "y", "z", "visibility"].map(|field| column(n, field)));
+            let text = format!("frame,{}\n0{row}\n1{row}\n", fields.collect::<Vec<_>>().join(","));
+            let found = read(&text, None).unwrap_or_else(|error| panic!("{error}: {text}"));
+            let points = found.by_name(1);
+            assert!(found.planar && points["left wrist"][0] > points["right wrist"][0]);
+            assert!(
+                points["right wrist"][2] > points["nose"][2] && points["nose"][2] > points["left wrist"][2]
+            );
+            let remarks = found.remarks().join("; ");
+            assert!(remarks.contains("in the layout MediaPipe"), "{remarks}");
+        }
+        // Markers in space have no confidences.
+        let header: String = (1..=17).map(|n| format!(",M{n}_x,M{n}_y,M{n}_z")).collect();
+        let row: String = (1..=17).map(|n| format!(",{},{},{}", 10 * n, 7 * n, 100 * n)).collect();
+        let found = read(&format!("frame{header}\n0{row}\n"), None).expect("markers");
+        assert!(!found.planar && found.names[0] == "M1");
     }
 
     #[test]

@@ -4,6 +4,7 @@ use layouts::{LAYOUTS, Layout};
 
 mod crowd;
 mod damaged;
+mod pictures;
 mod scores;
 mod unordered;
 

@@ -54,3 +54,27 @@ fn single_pixels_without_a_value_are_filled_and_rows_are_refused() {
     let error = read_with(&row).unwrap_err().to_string();
     assert!(error.contains("1.tif") && error.contains("9 have none"), "{error}");
 }
+
+#[test]
+fn camera_frames_even_out_the_slices_and_white_stays_white() {
+    use farnear_files::{image_file::encode_png, npy};
+
+    let folder = tempfile::tempdir().unwrap();
+    let (path, frames) = (folder.path().join("1.png"), folder.path().join("camera"));
+    std::fs::create_dir(&frames).unwrap();
+    let response = Array2::from_shape_fn((9, 10), |(_, x)| [1.0_f32, 1.25][x % 2]);
+    for (name, map) in [("dark.npy", &Array2::zeros(response.dim())), ("response.npy", &response)] {
+        std::fs::write(frames.join(name), npy::write(map.view())).unwrap();
+    }
+    let none_bad = Array2::<u16>::zeros(response.dim());
+    std::fs::write(frames.join("bad.png"), encode_png(none_bad.view(), 8).unwrap()).unwrap();
+    let mut codes = response.mapv(|response| (100.0 * response) as u16);
+    codes[(4, 5)] = 255;
+    std::fs::write(&path, encode_png(codes.view(), 8).unwrap()).unwrap();
+    let request = CalibrateStackRequest { camera_frames: Some(frames), ..CalibrateStackRequest::default() };
+    let (slices, _) = read(std::slice::from_ref(&path), &request, &Context::unattended()).unwrap();
+    for (at, value) in slices[0].indexed_iter() {
+        let expected = if at == (4, 5) { 1.0 } else { 100.0 / 255.0 };
+        assert!((value - expected).abs() < 1e-5, "{at:?}: {value}");
+    }
+}

@@ -359,3 +359,41 @@ fn exchanged_images_are_named() {
         assert_eq!(found.exchanged, [pair], "{:?}", found.left_out);
     }
 }
+
+#[test]
+fn a_wrapped_stack_is_named_and_loses_no_image() {
+    for first in [3, 8, 12] {
+        let mut images = true_stack(&even_positions());
+        images.rotate_right(first);
+        let found = checked(&images, &even_positions(), None);
+        assert_eq!((found.wrapped, &found.left_out[..]), (Some(first), &[][..]));
+        let remarks = found.remarks(|index| format!("{index}.png"));
+        assert!(
+            remarks.iter().any(|remark| remark.contains(&format!("begins with {first}.png"))),
+            "{remarks:?}"
+        );
+    }
+}
+
+#[test]
+fn an_all_in_focus_picture_is_left_out_at_any_place() {
+    let good = true_stack(&even_positions());
+    let positions: Vec<f64> = (0..=TRUE_COUNT).map(|index| index as f64).collect();
+    for at in [0, 7, TRUE_COUNT] {
+        let mut images = good.clone();
+        images.insert(at, scene(1));
+        let found = checked(&images, &positions, None);
+        let [(index, reason)] = &found.left_out[..] else { panic!("{at}: {:?}", found.left_out) };
+        assert!(*index == at && reason.contains("all-in-focus"), "{at}: {index} {reason}");
+        assert_eq!((found.warps.len(), found.gains.len()), (images.len(), images.len()));
+    }
+}
+
+#[test]
+fn numbers_count_all_images_also_an_all_in_focus_picture() {
+    let mut images = true_stack(&even_positions());
+    images.swap(5, 7);
+    images.insert(2, scene(1));
+    let positions: Vec<f64> = (0..=TRUE_COUNT).map(|index| index as f64).collect();
+    assert_eq!(checked(&images, &positions, None).exchanged, [[6, 8]]);
+}

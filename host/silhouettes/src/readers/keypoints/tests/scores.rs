@@ -34,3 +34,26 @@ fn triples_of_other_formats_may_be_coordinates() {
     let points = flat(&in_space(&layouts::HUMAN36M));
     upright_in_space(&format!(r#"[{{"keypoints":{points}}},{{"keypoints":{points}}}]"#));
 }
+
+#[test]
+fn scores_of_heat_maps_next_to_pixels_are_no_depths_in_any_format() {
+    let points = scored(17, |number| 1.1 + 0.2 * (number * 7 % 13) as f64);
+    upright(&points, 1);
+    upright(&format!("[{points},{points}]"), 2);
+    upright(&format!(r#"[{{"keypoints":{points}}}]"#), 1);
+}
+
+#[test]
+fn triples_of_an_unknown_layout_are_neither_pairs_nor_quadruples() {
+    // Pixels with scores, and places about the hips.
+    let others: [fn(usize) -> f64; 2] =
+        [|n| if n % 3 == 2 { 0.9 } else { 100.0 + 7.0 * n as f64 }, |n| (n * 37 % 90) as f64 / 50.0 - 0.9];
+    for (count, other) in [36, 60, 66, 72].into_iter().flat_map(|count| others.map(|other| (count, other))) {
+        let numbers: Vec<String> = (0..count).map(|n| other(n).to_string()).collect();
+        let json = format!(r#"[{{"keypoints":[{}]}}]"#, numbers.join(","));
+        let error = read(json.as_bytes(), "json", Choices::default()).expect_err("no layout").to_string();
+        assert!(error.contains("it holds no person's points"), "{count}: {error}");
+    }
+    let pairs: Vec<String> = person(layout(33), 100.0).iter().map(|[x, y, _]| format!("{x},{y}")).collect();
+    upright(&format!("[[{0}],[{0}]]", pairs.join(",")), 2);
+}

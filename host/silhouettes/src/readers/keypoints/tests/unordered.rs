@@ -118,6 +118,25 @@ fn points_are_placed_by_their_names() {
 }
 
 #[test]
+fn points_with_their_names_as_keys_are_read() {
+    let points = person(layout(17), 100.0);
+    let with = |point: fn(&[f64; 3]) -> String| -> String {
+        let points = COCO.iter().zip(&points).map(|(name, place)| format!("{name:?}:{}", point(place)));
+        format!(r#"{{"time":0.1,{}}}"#, points.collect::<Vec<_>>().join(","))
+    };
+    for frame in [
+        with(|[x, y, c]| format!(r#"{{"x":{x},"y":{y},"confidence":{c}}}"#)),
+        with(|[x, y, _]| format!("[{x},{y}]")),
+        with(|[x, y, c]| format!("[{x},{y},{c}]")),
+    ] {
+        upright(&frame, 1);
+        upright(&format!("[{frame},{frame}]"), 2);
+        upright(&format!(r#"{{"frames":[{{"keypoints":{frame}}},{{"people":[{frame}]}}]}}"#), 2);
+        upright(&format!(r#"{{"f1":{frame},"f2":{frame},"f4":{frame}}}"#), 4);
+    }
+}
+
+#[test]
 fn named_points_of_mediapipe_have_the_depth_of_a_picture() {
     let names = "nose left_eye_inner left_eye left_eye_outer right_eye_inner right_eye right_eye_outer left_ear right_ear \
                  mouth_left mouth_right left_shoulder right_shoulder left_elbow right_elbow left_wrist right_wrist \

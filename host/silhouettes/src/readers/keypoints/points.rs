@@ -1,0 +1,223 @@
+//! Points of one person in JSON: lists of numbers or of points, objects with x and y, or points by their names.
+
+use serde_json::{Map, Value};
+
+use super::{
+    json::{first_number, number},
+    labels::{self, labels},
+    layouts::{Layout, NAMED, NAMES},
+    spatial::HIGHEST_CONFIDENCE,
+};
+use crate::silhouette::capsule::Point3;
+
+pub const PEOPLE: [&str; 8] =
+    ["people", "bodies", "instances", "persons", "poses", "predictions", "detections", "annotations"];
+pub const POINTS: [&str; 12] = [
+    "pose_keypoints_2d",
+    "pose_keypoints",
+    "keypoints",
+    "joints",
+    "pose_landmarks",
+    "poseLandmarks",
+    "landmarks",
+    "landmark",
+    "pose",
+    "pose_world_landmarks",
+    "poseWorldLandmarks",
+    "worldLandmarks",
+];
+/// Points of less confidence are missing.
+pub const LEAST_CONFIDENCE: f64 = 0.1;
+
+#[derive(Clone, Copy, Debug)]
+pub struct Raw {
+    pub x: f64,
+    pub y: f64,
+    /// A depth, or the confidence if it is not `sure`.
+    pub third: Option<f64>,
+    pub sure: Option<f64>,
+}
+
+impl Raw {
+    pub const MISSING: Self = Self { x: f64::NAN, y: f64::NAN, third: None, sure: None };
+
+    pub fn in_space(&self) -> Option<Point3> {
+        let point = [self.x, self.y, self.third?];
+        point.iter().all(|v| v.is_finite()).then_some(point)
+    }
+
+    pub fn in_picture(&self) -> Option<Point3> {
+        let zero = self.x == 0.0 && self.y == 0.0;
+        // Not 0, 0, 0, which is a missing marker.
+        (!zero && self.x.is_finite() && self.y.is_finite()).then_some([self.x, self.y, 1e-9])
+    }
+}
+
+#[derive(Clone, Debug)]
+pub struct Person {
+    pub raw: Vec<Raw>,
+    pub layout: &'static Layout,
+    pub id: Option<i64>,
+    /// Of the points, see [`labels()`].
+    pub labels: Vec<String>,
+    /// Whether the points were triples in one list.
+    pub in_triples: bool,
+    /// By [`NAMES`], see [`Person::placed`].
+    pub points: Vec<Option<Point3>>,
+}
+
+impl Person {
+    /// Points in the order of [`NAMES`].
+    pub fn named(raw: Vec<Raw>, id: Option<i64>) -> Self {
+        Self { raw, layout: &NAMED, id, labels: Vec::new(), in_triples: false, points: Vec::new() }
+    }
+
+    /// For formats that define the third number of a triple as a visibility or a score, of any range.
+    pub fn scored(mut self) -> Self {
+        if self.in_triples && !self.layout.has_picture_depth() {
+            for raw in &mut self.raw {
+                raw.sure = raw.third.take().or(raw.sure);
+            }
+        }
+        self
+    }
+
+    /// Orders the points; returns the number that are hidden for their low confidence.
+    pub fn placed(&mut self, layout: &Layout, has_depth: bool) -> usize {
+        let mut unsure = 0;
+        self.points = vec![None; NAMES.len()];
+        for (place, raw) in layout.places().zip(&self.raw) {
+            let Some(place) = place else { continue };
+            let third = raw.third.filter(|_| !has_depth && !layout.has_picture_depth());
+            let is_sure = raw.sure.or(third).unwrap_or(1.0) >= LEAST_CONFIDENCE;
+            let point = if has_depth { raw.in_space() } else { raw.in_picture() };
+            unsure += usize::from(point.is_some() && !is_sure);
+            self.points[place] = point.filter(|_| is_sure);
+        }
+        unsure
+    }
+}
+
+pub fn points(value: &Value, confidences: Option<&[Value]>) -> Option<Person> {
+    match value {
+        Value::Object(map) => match rows(map) {
+            Some(rows) => points_of(&rows, confidences),
+            None => named(map),
+        },
+        other => points_of(other.as_array()?, confidences),
+    }
+}
+
+/// Points as x, y, c, ... in one list, lists of two to four numbers, or objects with x and y.
+pub fn points_of(items: &[Value], confidences: Option<&[Value]>) -> Option<Person> {
+    let flat = items.iter().any(|item| number(item).is_some());
+    let labels = labels(items);
+    let (layout, in_triples, mut raw): (_, _, Vec<Raw>) = if flat {
+        // No two layouts share a length.
+        let (layout, width) = [3, 2, 4].iter().find_map(|width| {
+            let layout =
+                Layout::of(items.len() / width).filter(|layout| layout.count * width == items.len())?;
+            let fits = match width {
+                2 => !are_triples(items),
+                // Only MediaPipe's; 60 and 72 numbers are 20 and 24 joints.
+                4 => layout.has_picture_depth() || !items.len().is_multiple_of(3),
+                _ => true,
+            };
+            fits.then_some((layout, *width))
+        })?;
+        (layout, width == 3, items.chunks_exact(width).map(of_numbers).collect())
+    } else {
+        let of = |item: &Value| match item {
+            Value::Null => Some(Raw::MISSING),
+            other => point(other),
+        };
+        let layout = Layout::of(items.len()).or((!labels.is_empty()).then_some(&NAMED))?;
+        (layout, false, items.iter().map(of).collect::<Option<_>>()?)
+    };
+    for (raw, given) in raw.iter_mut().zip(confidences.unwrap_or_default()) {
+        raw.sure = Some(number(given).unwrap_or(f64::NAN));
+    }
+    Some(Person { raw, layout, id: None, labels, in_triples, points: Vec::new() })
+}
+
+/// Numbers of a length of several layouts in pairs that are triples of another: every third is a score, or many are negative as in
+/// space.
+fn are_triples(items: &[Value]) -> bool {
+    let values: Vec<f64> = items.iter().map(|item| number(item).unwrap_or(f64::NAN)).collect();
+    let is_score = |value: &f64| (0.0..=HIGHEST_CONFIDENCE).contains(value);
+    let thirds = values.iter().skip(2).step_by(3).all(is_score);
+    let outside = values.iter().filter(|value| !is_score(value)).count();
+    let negative = values.iter().filter(|value| **value < 0.0).count();
+    values.len().is_multiple_of(3) && (thirds && 3 * outside > values.len() || 4 * negative >= values.len())
+}
+
+/// Points under their names as keys; other values are ignored.
+pub fn named(map: &Map<String, Value>) -> Option<Person> {
+    let named = map.iter().filter_map(|(name, value)| Some((name.clone(), point(value)?)));
+    let (labels, raw): (Vec<String>, Vec<Raw>) = named.unzip();
+    let person = Person { raw, layout: &NAMED, id: None, labels, in_triples: false, points: Vec::new() };
+    (person.raw.len() >= labels::LEAST).then_some(person)
+}
+
+pub fn id_of(person: &Map<String, Value>) -> Option<i64> {
+    let id = ["person_id", "idx", "track_id"].iter().find_map(|key| first_number(person.get(*key)?));
+    id.filter(|id| *id >= 0.0).map(|id| id as i64)
+}
+
+/// A COCO annotation of a category with names.
+pub fn annotated(annotation: &Value, names: &[String]) -> Option<Person> {
+    let numbers =
+        annotation.get("keypoints")?.as_array().filter(|numbers| numbers.len() == 3 * names.len())?;
+    let scored = |raw: Raw| Raw { third: None, sure: raw.third, ..raw };
+    let raw = numbers.chunks_exact(3).map(|numbers| scored(of_numbers(numbers))).collect();
+    let layout = Layout::of(names.len()).unwrap_or(&NAMED);
+    let id = id_of(annotation.as_object()?);
+    Some(Person { raw, layout, id, labels: names.to_vec(), in_triples: false, points: Vec::new() })
+}
+
+fn point(value: &Value) -> Option<Raw> {
+    match value {
+        Value::Array(numbers) if (2..=4).contains(&numbers.len()) => Some(of_numbers(numbers)),
+        Value::Object(map) => of_object(map),
+        _ => None,
+    }
+}
+
+fn of_numbers(numbers: &[Value]) -> Raw {
+    let at = |k: usize| numbers.get(k).map(|value| number(value).unwrap_or(f64::NAN));
+    Raw { x: at(0).unwrap_or(f64::NAN), y: at(1).unwrap_or(f64::NAN), third: at(2), sure: at(3) }
+}
+
+fn of_object(map: &Map<String, Value>) -> Option<Raw> {
+    // A person's box has a place, too.
+    if has_key(map) {
+        return None;
+    }
+    let sure =
+        ["visibility", "score", "confidence", "c"].iter().find_map(|key| map.get(*key).and_then(number));
+    // PoseNet nests the position.
+    let place = map.get("position").and_then(Value::as_object).unwrap_or(map);
+    let [x, y] = ["x", "y"].map(|key| place.get(key).map(|value| number(value).unwrap_or(f64::NAN)));
+    Some(Raw { x: x?, y: y?, third: place.get("z").and_then(number), sure: sure.or(Some(1.0)) })
+}
+
+/// Points of Ultralytics' columns `x`, `y` and `visible`.
+fn rows(columns: &Map<String, Value>) -> Option<Vec<Value>> {
+    let column = |key: &str| columns.get(key).and_then(Value::as_array);
+    let (x, y) = (column("x")?, column("y")?);
+    let sure = ["visible", "confidence"].into_iter().find_map(column);
+    let row = |(index, (x, y)): (usize, (&Value, &Value))| {
+        let sure = sure.and_then(|sure| sure.get(index)).cloned();
+        Value::Array([Some(x.clone()), Some(y.clone()), sure].into_iter().flatten().collect())
+    };
+    Some(x.iter().zip(y).enumerate().map(row).collect())
+}
+
+fn has_key(map: &Map<String, Value>) -> bool {
+    PEOPLE.iter().chain(&POINTS).any(|key| map.contains_key(*key))
+}
+
+/// Whether a map holds people, a person or its points.
+pub fn is_frame(map: &Map<String, Value>) -> bool {
+    has_key(map) || named(map).is_some()
+}

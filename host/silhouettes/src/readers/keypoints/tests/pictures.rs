@@ -1,0 +1,59 @@
+//! What files state about pictures, and what they lack.
+
+use super::*;
+
+#[test]
+fn the_shape_of_the_picture_is_that_of_the_caller() {
+    let json = |width: f64, height: f64| {
+        let points: Vec<String> = person(layout(17), 100.0)
+            .iter()
+            .map(|[x, y, c]| format!("[{},{},{c}]", x / width, y / height))
+            .collect();
+        format!(r#"{{"width":640,"height":480,"frames":[[{0}],[{0}]]}}"#, points.join(","))
+    };
+    let portrait = Choices { aspect: Some("9:16".parse().expect("a shape")), ..Choices::default() };
+    let read_as = |json: &str, choices| read(json.as_bytes(), "json", choices).expect("keypoints");
+    let wide = |found: &super::super::super::recording::Recording| {
+        let points = found.by_name(0);
+        let wide = points["left shoulder"][0] - points["right shoulder"][0];
+        wide / (points["left shoulder"][2] - points["left ankle"][2])
+    };
+    let parts = json(180.0, 320.0);
+    let found = read_as(&parts, portrait);
+    assert!((wide(&found) - 36.0 / 134.0).abs() < 1e-6, "{}", wide(&found));
+    let remarks = found.remarks().join("; ");
+    assert!(remarks.contains("a picture of 0.562 times its height (by --aspect)"), "{remarks}");
+    assert!(wide(&read_as(&parts, Choices::default())) > 0.6, "of 4:3, as the file states");
+    let remarks = read_as(&json(1.0, 1.0), portrait).remarks().join("; ");
+    assert!(remarks.contains("--aspect 9:16 is ignored"), "{remarks}");
+}
+
+#[test]
+fn a_category_that_the_file_does_not_list_is_reported() {
+    let json = |category: usize| {
+        format!(
+            r#"{{"images":[{{"id":7,"file_name":"b1.png"}}],"categories":[{{"id":1,"name":"macaque"}}],
+               "annotations":[{{"image_id":7,"category_id":{category},"keypoints":{}}}]}}"#,
+            flat(&person(layout(17), 100.0))
+        )
+    };
+    let remarks = upright(&json(3), 1).remarks().join("; ");
+    assert!(remarks.contains("`categories` (1) lacks the category_id 3 of 1 annotations"), "{remarks}");
+    let remarks = upright(&json(1), 1).remarks().join("; ");
+    assert!(!remarks.contains("category"), "{remarks}");
+}
+
+#[test]
+fn pictures_of_two_recordings_are_reported() {
+    let points = flat(&person(layout(17), 100.0));
+    let json = |folders: &[&str]| {
+        let names = folders.iter().flat_map(|folder| (1..=4).map(move |n| format!("{folder}/{n:03}.jpg")));
+        let entries: Vec<String> =
+            names.map(|name| format!(r#"{{"image_id":"{name}","keypoints":{points}}}"#)).collect();
+        format!("[{}]", entries.join(","))
+    };
+    let remarks = upright(&json(&["walk", "run"]), 8).remarks().join("; ");
+    assert!(remarks.contains("2 sequences, which begin with run/001.jpg, walk/001.jpg"), "{remarks}");
+    let remarks = upright(&json(&["walk"]), 4).remarks().join("; ");
+    assert!(!remarks.contains("sequence"), "{remarks}");
+}
