@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 use crate::fourier::{Complex64, transform};
 
 /// Smallest side of a usable image.
-const SMALLEST_PX: usize = 8;
+pub(crate) const SMALLEST_PX: usize = 8;
 
 /// Name of the measure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -107,23 +107,28 @@ fn fft_sum(image: ArrayView2<f32>) -> f64 {
         .sum()
 }
 
+/// Without neighbourhoods of pixels that are not finite.
 fn mean_of_neighbourhoods(image: ArrayView2<f32>, f: impl Fn(&[[f32; 3]; 3]) -> f32) -> f64 {
     let image: Array2<f32> = image.as_standard_layout().into_owned();
     let (height, width) = image.dim();
-    let mut sum = 0.0;
+    let (mut sum, mut seen) = (0.0, 0_u64);
     for row in 1..height - 1 {
         let rows: [_; 3] = std::array::from_fn(|i| image.row(row + i - 1));
-        let mut of_row = 0.0_f32;
+        let (mut of_row, mut seen_of_row) = (0.0_f32, 0_u32);
         for column in 1..width - 1 {
             let at = |i: usize| [rows[i][column - 1], rows[i][column], rows[i][column + 1]];
-            of_row += f(&[at(0), at(1), at(2)]);
+            let value = f(&[at(0), at(1), at(2)]);
+            of_row += if value.is_finite() { value } else { 0.0 };
+            seen_of_row += u32::from(value.is_finite());
         }
         sum += f64::from(of_row);
+        seen += u64::from(seen_of_row);
     }
-    sum / ((height - 2) * (width - 2)) as f64
+    sum / seen as f64
 }
 
-fn tenengrad(image: ArrayView2<f32>) -> f64 {
+/// Mean squared gradient.
+pub(crate) fn tenengrad(image: ArrayView2<f32>) -> f64 {
     mean_of_neighbourhoods(image, |[a, b, c]| {
         let x = (a[2] + 2.0 * b[2] + c[2]) - (a[0] + 2.0 * b[0] + c[0]);
         let y = (c[0] + 2.0 * c[1] + c[2]) - (a[0] + 2.0 * a[1] + a[2]);

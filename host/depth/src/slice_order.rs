@@ -7,7 +7,7 @@
 use ndarray::{ArrayView2, s};
 
 use crate::brightness;
-use crate::focus_measure::FocusMeasure;
+use crate::focus_measure::{SMALLEST_PX, tenengrad};
 
 /// Fewest slices whose order tells anything.
 const FEWEST: usize = 5;
@@ -30,14 +30,42 @@ const COMPOSED_BLOCKS: f64 = 0.9;
 /// By how much an exchange with the first or the last slice must be better than one without: sharpness has one neighbour there.
 const AT_END: f64 = 0.1;
 
-/// Sharpness of each of the [`brightness::blocks`] of a slice; empty for images that are too small or dark.
+/// Sharpness of each of the [`brightness::blocks`] of a slice, relative to its brightness; not finite where half of a block was
+/// not seen, and empty for slices that are too small or dark. See [`comparable`].
 pub fn sharpness(image: ArrayView2<f32>) -> Vec<f64> {
-    let measured = brightness::blocks(image.dim())
-        .map(|[rows, columns]| FocusMeasure::Tenengrad.of(image.slice(s![rows, columns])).ok());
-    measured.collect::<Option<Vec<f64>>>().unwrap_or_default()
+    let seen = |part: ArrayView2<f32>| part.iter().filter(|value| value.is_finite()).count();
+    let sum: f64 = image.iter().filter(|value| value.is_finite()).map(|value| f64::from(*value)).sum();
+    let mean = sum / seen(image) as f64;
+    let parts: Vec<_> =
+        brightness::blocks(image.dim()).map(|[rows, columns]| image.slice(s![rows, columns])).collect();
+    let is_small = |part: &ArrayView2<f32>| part.nrows().min(part.ncols()) < SMALLEST_PX;
+    if mean.is_nan() || mean <= 0.0 || parts.iter().any(is_small) {
+        return Vec::new();
+    }
+    let measured = |part: ArrayView2<f32>| match 2 * seen(part) < part.len() {
+        true => f64::NAN,
+        false => tenengrad(part) / (mean * mean),
+    };
+    parts.into_iter().map(measured).collect()
 }
 
-/// Pairs of slices that look exchanged, from the [`sharpness`] of each slice in the given order. Not found: neighbours at an
+/// The [`sharpness`] of the slices of a stack in the blocks that all of them show and that have detail in any.
+pub fn comparable(measured: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    /// Less detail than this part of the largest sharpness is none.
+    const LEAST: f64 = 1e-4;
+    let least = LEAST * measured.iter().flatten().copied().fold(0.0, f64::max);
+    let of = |block: usize| measured.iter().filter(|slice| !slice.is_empty()).map(move |slice| slice[block]);
+    let blocks = measured.iter().map(Vec::len).max().unwrap_or(0);
+    let is_kept = |block: &usize| of(*block).all(f64::is_finite) && of(*block).any(|value| value > least);
+    let kept: Vec<usize> = (0..blocks).filter(is_kept).collect();
+    let of_slice = |slice: &Vec<f64>| match slice.is_empty() {
+        true => Vec::new(),
+        false => kept.iter().map(|block| slice[*block].max(least)).collect(),
+    };
+    measured.iter().map(of_slice).collect()
+}
+
+/// Pairs of slices that look exchanged, from the [`comparable`] sharpness of each slice in the given order. Not found: neighbours at an
 /// end, slices equally far from the focus of a flat target, and differences below the noise.
 pub fn exchanged(sharpness: &[Vec<f64>]) -> Vec<[usize; 2]> {
     let mut found = Vec::new();
@@ -51,7 +79,7 @@ pub fn exchanged(sharpness: &[Vec<f64>]) -> Vec<[usize; 2]> {
     found
 }
 
-/// The first slice of a stack whose order is wrapped (6 to 9, then 1 to 5), from the [`sharpness`] of each slice in the given order.
+/// The first slice of a stack whose order is wrapped (6 to 9, then 1 to 5), from the [`comparable`] sharpness of each slice in the given order.
 pub fn wrapped(sharpness: &[Vec<f64>]) -> Option<usize> {
     let path = Path::of(sharpness)?;
     let from = |first: usize| {
@@ -65,7 +93,7 @@ pub fn wrapped(sharpness: &[Vec<f64>]) -> Option<usize> {
 }
 
 /// A slice that is sharp everywhere and does not fit into the order, such as a picture that is composed of the others, from the
-/// [`sharpness`] of each slice.
+/// [`comparable`] sharpness of each slice.
 pub fn composed(sharpness: &[Vec<f64>]) -> Option<usize> {
     let path = Path::of(sharpness)?;
     let is_sharp = |own: &usize| {
@@ -80,7 +108,15 @@ pub fn composed(sharpness: &[Vec<f64>]) -> Option<usize> {
         order.remove(own + 1);
         path.excess(&order)
     };
-    (0..sharpness.len()).filter(is_sharp).find(|own| path.is_right(&without(own)))
+    // Next to a sharp end of the stack, a bad slice alone would contradict the order.
+    let is_alone = |own: &usize, excess: &[f64]| {
+        let mut others = (0..sharpness.len()).filter(|other| other != own);
+        others.all(|other| total(excess) < LEFT_OF_ABSENT * total(&without(&other)))
+    };
+    (0..sharpness.len()).filter(is_sharp).find(|own| {
+        let excess = without(own);
+        path.is_right(&excess) && is_alone(own, &excess)
+    })
 }
 
 fn total(excess: &[f64]) -> f64 {
@@ -250,7 +286,7 @@ mod tests {
     }
 
     fn measured(images: &[Array2<f32>]) -> Vec<Vec<f64>> {
-        images.iter().map(|image| sharpness(image.view())).collect()
+        comparable(&images.iter().map(|image| sharpness(image.view())).collect::<Vec<_>>())
     }
 
     fn even(count: usize) -> Vec<f32> {
@@ -317,11 +353,36 @@ mod tests {
 
     #[test]
     fn a_composed_picture_is_found_at_any_place() {
-        let good = measured(&stack(&even(15), [3.0, 11.0], 0.02));
+        let good = stack(&even(15), [3.0, 11.0], 0.02);
         for at in [0, 7, 15] {
             let mut bad = good.clone();
-            bad.insert(at, sharpness(scene(1).view()));
-            assert_eq!(composed(&bad), Some(at));
+            bad.insert(at, scene(1));
+            assert_eq!(composed(&measured(&bad)), Some(at));
+        }
+    }
+
+    /// A background without detail, and a border that one slice does not show.
+    #[test]
+    fn blocks_without_detail_and_unseen_ones_tell_nothing() {
+        let mut images = stack(&even(15), [3.0, 11.0], 0.0);
+        images.rotate_right(5);
+        let dark = |image: &mut Array2<f32>| image.slice_mut(s![..40, ..40]).fill(0.01);
+        images.iter_mut().for_each(dark);
+        images[7].column_mut(0).fill(f32::NAN);
+        images[8].slice_mut(s![.., ..10]).fill(f32::NAN);
+        assert_eq!(wrapped(&measured(&images)), Some(5));
+        images.rotate_left(5);
+        images.insert(6, scene(1));
+        images.iter_mut().for_each(dark);
+        assert_eq!(composed(&measured(&images)), Some(6));
+    }
+
+    #[test]
+    fn a_sharp_end_next_to_a_blurred_slice_is_not_composed() {
+        for (depths, blurred) in [([0.0, 0.8], 1), ([11.0, 10.2], 10)] {
+            let mut images = stack(&even(12), depths, 0.02);
+            images[blurred] = (0..12).fold(images[blurred].clone(), |image, _| smoothed(&image));
+            assert_eq!(composed(&measured(&images)), None, "{depths:?}");
         }
     }
 

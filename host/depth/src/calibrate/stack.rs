@@ -208,6 +208,7 @@ pub fn calibrate_stack(
         .map(|slice| not_stopped().then(|| slice_order::sharpness(slice.view())))
         .collect::<Option<_>>()
         .ok_or(StackError::Stopped)?;
+    let sharpness = slice_order::comparable(&sharpness);
     let (exchanged, wrapped) = (slice_order::exchanged(&sharpness), slice_order::wrapped(&sharpness));
     let sharpest = plane.at(0.5 * height as f64, 0.5 * width as f64).round().max(0.0) as usize;
     let fixed_pattern = fixed_pattern::find(slices, sharpest.min(slices.len() - 1));

@@ -6,7 +6,7 @@ use super::{LEAST_IMAGES, MOST_GUIDED_PX, MOST_SMOOTHING_PX};
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages name the fields")]
 pub enum StackError {
-    #[error("a stack of {count} images: at least {LEAST_IMAGES} at different focus are needed")]
+    #[error("a stack of {count} images: at least {LEAST_IMAGES} at different focus distances are needed")]
     TooFew { count: usize },
     #[error(
         "image {number} has {width}x{height} px and the first one {}x{}: they must have one size", of.1, of.0

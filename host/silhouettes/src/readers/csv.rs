@@ -93,10 +93,14 @@ fn plain(columns: &StringRecord, rows: &[StringRecord]) -> Result<Found, Recordi
         markers = markers_of(columns, |column| unseparated(column).filter(|(name, _)| has_all(name)))?;
     }
     if markers.is_empty() {
-        return Err(RecordingError::Kind {
-            kind: "CSV",
-            reason: "its header names no marker (NAME_x,NAME_y,NAME_z)".into(),
-        });
+        const SHOWN: usize = 6;
+        let shown: Vec<&str> = columns.iter().take(SHOWN).collect();
+        let reason = format!(
+            "its header names no marker ({}): expected NAME_x,NAME_y,NAME_z, or the x1,y1,v1 of numbered keypoints, as many as a \
+             layout has",
+            shown.join(",")
+        );
+        return Err(RecordingError::Kind { kind: "CSV", reason });
     }
     let is_kinect = !is_separated && KINECT.iter().all(|joint| markers.iter().any(|(name, _)| name == joint));
     let (mm, up, source) = if is_kinect {
@@ -354,7 +358,9 @@ mod tests {
             let error = read(short.as_bytes()).expect_err("short").to_string();
             assert!(error.starts_with("line 3"), "{error}");
         }
-        assert!(read(b"").is_err() && read(b"a,b\n").is_err());
+        let error = read(b"a,b\n").expect_err("no marker").to_string();
+        assert!(error.contains("names no marker (a,b): expected NAME_x"), "{error}");
+        assert!(read(b"").is_err());
     }
 
     #[test]

@@ -19,6 +19,7 @@ use super::{
     recording::{Choices, Found, Known, RecordingError, Source, Unit, Up},
 };
 use crate::silhouette::capsule::Point3;
+use aspect::Aspect;
 use document::Document;
 use layouts::NAMES;
 use people::distance;
@@ -61,13 +62,16 @@ pub fn read_files<'a>(
 
 /// The first remark is `about` the points, or about their labels or layout.
 fn found(document: Document, choices: Choices, about: Option<String>) -> Result<Found, RecordingError> {
-    let Document { mut frames, size, remarks: of_document, unread, .. } = document;
+    let Document { mut frames, size, remarks: of_document, unread, longest, .. } = document;
     let labelled = labels::order(&mut frames)?;
     let everyone = || frames.iter().flatten();
     let with_people = frames.iter().filter(|people| !people.is_empty()).count();
     let is_read = unread <= MOST_UNREAD * with_people;
     let first = everyone().next().filter(|_| is_read).ok_or_else(|| {
         let what = match with_people {
+            0 if longest > 0 => {
+                format!("it holds no person's points, the longest list in a frame has {longest} values")
+            }
             0 => "it holds no person's points".to_owned(),
             _ => format!("it holds people's points in {with_people} frames, other values in {unread}"),
         };
@@ -80,7 +84,12 @@ fn found(document: Document, choices: Choices, about: Option<String>) -> Result<
     })?;
     let has_depth = spatial::has_depth(everyone());
     let in_picture = !has_depth && !spatial::are_centred(everyone());
-    let layout = if has_depth { spatial::layout(everyone())? } else { first.layout };
+    let own = first.layout;
+    let layout = match labelled {
+        _ if has_depth => spatial::layout(everyone())?,
+        Some(_) => own,
+        None => spatial::picture_layout(everyone(), own),
+    };
     let seen = if has_depth { "in three dimensions" } else { "seen from one side" };
     let about = about
         .or(labelled)
@@ -96,7 +105,7 @@ fn found(document: Document, choices: Choices, about: Option<String>) -> Result<
         .iter_mut()
         .flatten()
         .map(|person| {
-            let layout = if has_depth { layout } else { person.layout };
+            let layout = if has_depth || person.layout == own { layout } else { person.layout };
             person.placed(layout, has_depth)
         })
         .sum();
@@ -117,8 +126,8 @@ fn found(document: Document, choices: Choices, about: Option<String>) -> Result<
         let across = usize::from(matches!(choices.up, Some(Up::X | Up::MinusX)));
         let points = frames.iter_mut().flatten().flat_map(|person| person.points.iter_mut().flatten());
         points.for_each(|point| point[across] *= aspect);
-    } else if let Some(aspect) = choices.aspect {
-        remarks.push(format!("--aspect {aspect} is ignored, for coordinates are not parts of a picture"));
+    } else {
+        remarks.extend(choices.aspect.filter(|_| !has_depth).map(Aspect::ignored));
     }
     let (tracks, others) = people::followed(&frames);
     if tracks.len() > 1 {

@@ -1,5 +1,6 @@
 //! Whether a recorded person is upright: the head above the feet along the upward axis. A person upside-down means that
-//! the other direction is up. A person who is longer than high may lie, unless the feet are on the ground of another axis.
+//! the other direction is up. A person who is longer than high may lie, unless the feet are on the ground of another axis and
+//! the body is not on that of the usual one.
 
 use super::recording::{Known, Source, Up};
 use crate::silhouette::{anatomy::Anatomy, capsule::Point3};
@@ -12,6 +13,8 @@ const UPRIGHT: f64 = 0.8;
 const LONGER: f64 = 1.4;
 /// Height of the feet above the origin over that of the head above the feet, of a person who stands on the ground.
 const ON_GROUND: std::ops::RangeInclusive<f64> = -0.05..=0.15;
+/// Heights of all points above the origin over the way from the feet to the head, of a person who lies on the ground.
+const LYING_ON_GROUND: std::ops::RangeInclusive<f64> = -0.05..=0.25;
 
 fn mean(frame: &[Option<Point3>], places: &[usize]) -> Option<Point3> {
     let at = |place: &usize| frame.get(*place).copied().flatten();
@@ -58,8 +61,16 @@ fn standing(ways: &[Point3], frames: &Frames, anatomy: &Anatomy) -> Option<(Up, 
     (2 * count > ways.len() && is_along && ON_GROUND.contains(&(feet / high))).then_some((up, count))
 }
 
+/// Whether most frames show a person of this length who lies on the ground.
+fn lies_on_ground(up: Up, length: f64, frames: &Frames, anatomy: &Anatomy) -> bool {
+    let is_low = |point: &Point3| LYING_ON_GROUND.contains(&(up.height(*point) / length));
+    let shown =
+        || frames.iter().map(|frame| body_points(frame, &anatomy.body)).filter(|points| !points.is_empty());
+    2 * shown().filter(|points| points.iter().all(is_low)).count() > shown().count()
+}
+
 /// Reverses an upward axis that was not stated where the head is below the feet in most frames, and replaces one that only the
-/// format implies where the person stands along another; a remark where it was stated.
+/// format implies where the person stands along another and does not lie on its ground; a remark where it was stated.
 pub fn checked(
     up: Known<Up>,
     frames: &Frames,
@@ -72,11 +83,12 @@ pub fn checked(
         && up.source == Source::Format
         && !planar
         && ![value, value.reversed()].contains(&best)
+        && !lies_on_ground(value, best.height(sum(&ways)) / all as f64, frames, anatomy)
     {
         let reason = format!(
             "for the head is above the feet along it in {count} of {all} frames, and the feet are on its ground"
         );
-        return (Known { value: best, source: Source::Guess { reason, sure: true } }, None);
+        return (Known { value: best, source: Source::Guess { reason, sure: false } }, None);
     }
     let below = ways.iter().filter(|way| Up::along(**way) == value.reversed()).count();
     if 2 * below <= all {
@@ -101,7 +113,7 @@ pub fn lying(up: Up, frames: &Frames, anatomy: &Anatomy, planar: bool) -> Option
     // Spread arms hide the extents of a body.
     let of_ways = ways.iter().filter(|_| !planar).map(|way| {
         let [x, y, z] = up.to_z(*way).map(f64::abs);
-        (x.max(y), z / LONGER)
+        (x.max(y), z)
     });
     let extents = frames.iter().filter(|_| planar || ways.is_empty()).filter_map(|frame| {
         let points: Vec<Point3> =
@@ -149,15 +161,19 @@ mod tests {
 
     /// A body with its head 1.7 m above its feet along `up`, arms spread, and points that no template names.
     fn body(up: Up, feet_mm: f64) -> String {
+        moved(up, [0.0, feet_mm])
+    }
+
+    fn moved(up: Up, [behind_mm, feet_mm]: [f64; 2]) -> String {
         let turned = |[x, y, z]: [f64; 3]| {
-            let point = [x, y, z + feet_mm - 100.0];
+            let point = [x, y + behind_mm, z + feet_mm - 100.0];
             // Inverse of the rotation to z up.
             let columns = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| up.to_z(axis));
             columns.map(|column| (0..3).map(|k| column[k] * point[k]).sum::<f64>().to_string()).join(",")
         };
         let points = [
-            ("LFHD", [100.0, 50.0, 1800.0]),
-            ("RFHD", [250.0, 50.0, 1800.0]),
+            ("LFHD", [100.0, -100.0, 1800.0]),
+            ("RFHD", [250.0, -100.0, 1800.0]),
             ("LASI", [100.0, 60.0, 1000.0]),
             ("RASI", [300.0, 60.0, 1000.0]),
             ("LFIN", [-750.0, 60.0, 1500.0]),
@@ -199,11 +215,31 @@ mod tests {
             assert!(is_upright(&turned) && turned.up.value == up, "{up}");
             let remarks = turned.remarks();
             assert!(
-                remarks[0].starts_with(&format!("{up} is taken as up: a guess, for the head")),
+                remarks[0].starts_with(&format!("{up} is taken as up: a doubtful guess, for the head")),
                 "{remarks:?}"
             );
             assert!(!is_upright(&recording(&body(up, 100.0), Some(Up::Z))), "{up}");
         }
+    }
+
+    #[test]
+    fn a_person_who_lies_on_the_ground_with_the_feet_at_the_origin_stays() {
+        for (up, behind_mm) in [(Up::X, 150.0), (Up::MinusY, 150.0), (Up::Y, -250.0), (Up::MinusX, -250.0)] {
+            let text = moved(up, [behind_mm, 100.0]);
+            let lying = recording(&text, None);
+            assert!(!is_upright(&lying) && lying.up.value == Up::Z, "{up}");
+            let remarks = lying.remarks();
+            assert!(remarks[0].starts_with("longer than high in 2 of 2 frames"), "{remarks:?}");
+            assert!(is_upright(&recording(&text, Some(up))), "{up}");
+        }
+    }
+
+    #[test]
+    fn a_person_who_leans_is_not_longer_than_high() {
+        let leaning = body(Up::Z, 100.0).replace(",-100,1800", ",1900,1700");
+        assert_ne!(leaning, body(Up::Z, 100.0));
+        let remarks = recording(&leaning, None).remarks();
+        assert!(remarks.iter().all(|remark| !remark.contains("longer than high")), "{remarks:?}");
     }
 
     #[test]

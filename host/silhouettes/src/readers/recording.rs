@@ -230,6 +230,7 @@ impl Found {
                 repeated.join(", ")
             ));
         }
+        remarks.extend(choices.aspect.filter(|_| !self.planar).map(Aspect::ignored));
         let anatomy = Anatomy::of(&names);
         body::add_neck(&mut names, &anatomy.aliases, &mut frames);
         let unit = body::plausible(self.unit.unless(choices.unit), &frames, &anatomy.body);

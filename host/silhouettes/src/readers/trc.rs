@@ -61,11 +61,8 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         .filter(|(_, group)| !group[0].is_empty())
         .map(|(place, group)| (place, group[0].to_owned()))
         .collect();
-    let named = cells.iter().filter(|cell| !cell.is_empty()).count();
     // Some programs write other numbers of tabs between the names.
-    let packed = named as f64 == count
-        || cells.iter().any(|c| !c.is_empty())
-            && cells.iter().skip_while(|c| c.is_empty()).take(3).filter(|c| !c.is_empty()).count() > 1;
+    let packed = cells.iter().enumerate().any(|(at, cell)| at % 3 != 0 && !cell.is_empty());
     let (mut places, mut names): (Vec<usize>, Vec<String>) = if packed {
         cells.iter().filter(|name| !name.is_empty()).map(|name| (*name).to_owned()).enumerate().unzip()
     } else {
@@ -100,7 +97,7 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         match promised_frames("NumFrames", promised, frames.len()) {
             Ok(remark) => remarks.extend(remark),
             Err(_) if first.is_some_and(|first| first > 1.0) => remarks.push(format!(
-                "NumFrames counts {promised} frames, the file has {}: a part, for it begins with frame {}",
+                "NumFrames counts {promised} frames, the file has {} from frame {} on: a part of a recording, or cut short",
                 frames.len(),
                 first.unwrap_or_default()
             )),

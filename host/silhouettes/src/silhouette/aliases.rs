@@ -89,10 +89,10 @@ fn matched(simple: &[String], template: &Template, naming: Option<&Naming>) -> V
     for (place, name) in simple.iter().enumerate() {
         for (theirs, ours) in naming.into_iter().flat_map(|naming| naming.names) {
             for [side, short] in [["left", "l"], ["right", "r"]] {
-                let sided = |theirs: &str| theirs.replace('#', side).replace('@', short);
                 // `UpperLeg_L` is `LUpperLeg`.
-                let turned = theirs.strip_prefix(['#', '@']).map(|joint| [joint, &theirs[..1]].concat());
-                if *name == sided(theirs) || turned.is_some_and(|turned| *name == sided(&turned)) {
+                let turned = theirs.strip_prefix('@').map(|joint| format!("{joint}@"));
+                let mut forms = std::iter::once(*theirs).chain(turned.as_deref());
+                if forms.any(|form| [side, short].iter().any(|side| *name == form.replace('@', side))) {
                     let capital = if side == "left" { "Left" } else { "Right" };
                     let side = if template.name == "bvh" { capital } else { side };
                     add(place, &ours.replace('#', side).replace('&', &short.to_uppercase()));
@@ -267,7 +267,13 @@ mod tests {
                 "root lhip lknee lankle ltoe ltoe_End rhip rknee rankle rtoe rtoe_End lowerback upperback chest lowerneck upperneck \
                  upperneck_End lclavicle lshoulder lelbow lwrist rclavicle rshoulder relbow rwrist",
                 "bvh",
-                20,
+                22,
+            ),
+            (
+                "Hips Spine Neck Head Left_UpperArm Left_LowerArm Left_Hand Right_UpperArm Right_LowerArm Right_Hand Left_Thigh \
+                 Left_Calf Left_Foot Right_Thigh Right_Calf Right_Foot",
+                "bvh",
+                16,
             ),
             (
                 "Hips Spine Neck Head LShoulder LArm LForeArm LHand RShoulder RArm RForeArm RHand LUpLeg LLeg LFoot LToe RUpLeg \

@@ -237,7 +237,11 @@ fn a_trc_file_of_a_part_of_a_recording_is_read_with_a_remark() {
     let part = whole.replace("\n1\t0\t", "\n185\t3.07\t").replace("\n2\t0.01\t", "\n186\t3.08\t");
     let found = trc::read(part.as_bytes()).expect("a part");
     assert_eq!(found.frames.len(), 2);
-    assert!(found.remarks[0].contains("900 frames, the file has 2: a part"), "{:?}", found.remarks);
+    assert!(
+        found.remarks[0].contains("900 frames, the file has 2 from frame 185 on: a part"),
+        "{:?}",
+        found.remarks
+    );
     assert!(trc::read(whole.as_bytes()).is_err(), "cut short");
 }
 
@@ -275,6 +279,11 @@ fn names_of_a_trc_file_without_columns_are_reported_and_not_read() {
         assert_eq!((&found.names, &found.frames), (&whole.names, &whole.frames));
         assert!(found.remarks.join("; ").contains("2 names after the 2 markers"), "{:?}", found.remarks);
     }
+    // As many names as markers, of which the second has none.
+    let unnamed = TRC.replace("A\t\t\tB\n", "A\t\t\t\t\t\tV_Hip\t\t\t\n");
+    let found = trc::read(unnamed.as_bytes()).expect("a marker");
+    assert_eq!(found.names, ["A"]);
+    assert!(found.remarks.join("; ").contains("1 of 2 trajectories have no name"), "{:?}", found.remarks);
     let full = named.replace("4\t5\t6\n", "4\t5\t6\t7\t8\t9\t1\t2\t3\n");
     let error = trc::read(full.as_bytes()).expect_err("a wrong number").to_string();
     assert!(error.contains("4 marker names, NumMarkers says 2"), "{error}");

@@ -71,7 +71,8 @@ pub struct TrainRequest {
     #[cfg_attr(feature = "clap", arg(long, value_name = "UNIT"))]
     #[serde_as(as = "Option<DisplayFromStr>")]
     pub units: Option<Unit>,
-    /// Width and height of the picture, such as 9:16, for keypoints with coordinates from 0 to 1 [default: as the file states, or 16:9].
+    /// Width and height of the picture, such as 9:16 or 1080x1920, for keypoints with coordinates from 0 to 1 [default: as the file
+    /// states, or 16:9].
     #[cfg_attr(feature = "clap", arg(long, value_name = "WIDTH:HEIGHT"))]
     #[serde_as(as = "Option<DisplayFromStr>")]
     pub aspect: Option<Aspect>,

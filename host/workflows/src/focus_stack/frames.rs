@@ -52,7 +52,7 @@ pub(super) struct Frames {
     pub untold: Vec<usize>,
     /// Images that look exchanged.
     pub exchanged: Vec<[usize; 2]>,
-    /// The image at which the order should begin; none is left out then.
+    /// The image at which the order should begin; none but an all-in-focus picture is left out then.
     pub wrapped: Option<usize>,
     /// Usual correlation of neighbours; `None` if it was not measured.
     pub usual: Option<f64>,
@@ -75,8 +75,8 @@ impl Frames {
         left_out.chain(others).filter(|index| **index >= composed).for_each(|index| *index += 1);
         self.warps.insert(composed, Warp::IDENTITY);
         self.gains.insert(composed, 1.0);
-        let reason = "it is sharper than its place in the stack allows, in all parts: an all-in-focus picture, of another scene, or out \
-                      of order";
+        let reason = "it is sharper than its place in the stack allows, in all parts: an all-in-focus picture, of another scene, \
+                      out of order, or darker with more noise";
         self.left_out.push((composed, reason.into()));
         self.left_out.sort_by_key(|(index, _)| *index);
     }
@@ -274,6 +274,7 @@ where
             before = Some(image);
             self.context.progress.advance("images compared", index + 1, Some(count));
         }
+        found.sharpness = slice_order::comparable(&found.sharpness);
         Ok(found)
     }
 
@@ -290,6 +291,10 @@ where
         let scene = self.scene(&neighbours.links)?;
         let members: Vec<usize> = (0..count).filter(|index| scene.warps[*index].is_some()).collect();
         frames.gains = brightness::gains(&neighbours.brightness, &members);
+        let of_scene: Vec<Vec<f64>> =
+            members.iter().map(|index| neighbours.sharpness[*index].clone()).collect();
+        let exchanged = slice_order::exchanged(&of_scene);
+        frames.exchanged = exchanged.into_iter().map(|pair| pair.map(|index| members[index])).collect();
         // Next to an unknown foreign frame a good one looks shaken.
         let shaken = if scene.usual > TELLING {
             shaken::find(&neighbours.sharpness, positions, &frames.gains, &members)
@@ -309,10 +314,14 @@ where
                         nearest(&scene.warps, index).next().unwrap_or((index, Warp::IDENTITY));
                     let link = self.link(nearest, index)?;
                     if few_foreign {
-                        let reason = format!(
-                            "it shows another scene, or is turned, black or far out of focus (correlation with its neighbour {:.2}, of the others {:.2})",
-                            link.correlation, scene.usual
-                        );
+                        let reason = if self.model.is_none() && link.registered >= FOREIGN * registered {
+                            "it has moved against the others: --align similarity keeps it".to_owned()
+                        } else {
+                            format!(
+                                "it shows another scene, or is turned, black or far out of focus (correlation with its neighbour {:.2}, of the others {:.2})",
+                                link.correlation, scene.usual
+                            )
+                        };
                         frames.left_out.push((index, reason));
                     }
                     link.warp.after(&warp)
@@ -320,16 +329,15 @@ where
             };
             frames.warps[index] = warp.after(&back);
             if few_shaken && shaken.frames.contains(&index) {
-                let reason =
-                    "it is shaken or defocused: less sharp in most places than its neighbours suggest";
+                let reason = if frames.exchanged.iter().any(|[a, b]| (a..=b).contains(&&index)) {
+                    "it does not fit into the order, for images look exchanged here"
+                } else {
+                    "it is shaken or defocused: less sharp in most places than its neighbours suggest"
+                };
                 frames.left_out.push((index, reason.into()));
             }
         }
         frames.untold = shaken.untold;
-        let of_scene: Vec<Vec<f64>> =
-            members.iter().map(|index| neighbours.sharpness[*index].clone()).collect();
-        let exchanged = slice_order::exchanged(&of_scene);
-        frames.exchanged = exchanged.into_iter().map(|pair| pair.map(|index| members[index])).collect();
         frames.usual = Some(scene.usual);
         if self.model.is_none() {
             // In place, moving images correlate little.

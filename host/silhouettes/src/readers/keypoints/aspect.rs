@@ -14,6 +14,11 @@ impl Aspect {
     pub fn ratio(self) -> f64 {
         self.width / self.height
     }
+
+    /// The remark about a choice that has no effect.
+    pub fn ignored(self) -> String {
+        format!("--aspect {self} is ignored, for coordinates are not parts of a picture")
+    }
 }
 
 impl fmt::Display for Aspect {
@@ -29,9 +34,10 @@ impl FromStr for Aspect {
         let side = |text: &str| text.trim().parse().ok().filter(|side: &f64| side.is_finite() && *side > 0.0);
         text.split_once([':', 'x'])
             .and_then(|(width, height)| Some(Self { width: side(width)?, height: side(height)? }))
+            .filter(|aspect| (0.1..=10.0).contains(&aspect.ratio()))
             .ok_or_else(|| {
                 format!(
-                    "`{text}` is not the shape of a picture: expected its width and height, such as 9:16 or 1080x1920"
+                    "`{text}` is not the shape of a picture: expected its width and height, such as 9:16 or 1080x1920, from 1:10 to 10:1"
                 )
             })
     }
@@ -47,7 +53,7 @@ mod tests {
             assert_eq!(text.parse::<Aspect>().map(Aspect::ratio), Ok(0.5625), "{text}");
         }
         assert_eq!("1080x1920".parse::<Aspect>().map(|aspect| aspect.to_string()), Ok("1080:1920".into()));
-        for bad in ["", "9", "9:", "0:16", "9:-16", "inf:1", "9/16"] {
+        for bad in ["", "9", "9:", "0:16", "9:-16", "inf:1", "9/16", "16:1", "1:1080"] {
             let error = bad.parse::<Aspect>().expect_err("no shape");
             assert!(error.contains(&format!("`{bad}`")) && error.contains("9:16"), "{error}");
         }

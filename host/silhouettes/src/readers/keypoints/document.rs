@@ -20,6 +20,8 @@ pub struct Document {
     pub remarks: Vec<String>,
     /// Entries (frames, people of a picture or a track) whose values are not points of a person.
     pub unread: usize,
+    /// Length of the longest list in them.
+    pub longest: usize,
     /// A list, whose items may be frames, or people of one frame.
     is_list: bool,
 }
@@ -76,7 +78,8 @@ impl Document {
         }
         let size = documents.iter().find_map(|(_, document)| document.size);
         let unread = documents.iter().map(|(_, document)| document.unread).sum();
-        let mut whole = Self { size, unread, ..Self::default() };
+        let longest = documents.iter().map(|(_, document)| document.longest).max().unwrap_or(0);
+        let mut whole = Self { size, unread, longest, ..Self::default() };
         // A list in such a file holds people, not frames.
         let people = |document: Self| -> Vec<Person> { document.frames.into_iter().flatten().collect() };
         whole.numbered(documents.into_iter().map(|(name, document)| (split(name), people(document))));
@@ -207,7 +210,10 @@ impl Document {
 
     fn entry(&mut self, value: &Value) -> Vec<Person> {
         let people = self.people(value);
-        self.unread += usize::from(people.is_empty() && holds_values(value));
+        if people.is_empty() && holds_values(value) {
+            self.unread += 1;
+            self.longest = self.longest.max(longest(value));
+        }
         people
     }
 
@@ -269,6 +275,15 @@ fn holds_values(value: &Value) -> bool {
             .any(|key| map.get(*key).is_some_and(holds_values)),
         Value::Number(_) | Value::String(_) => true,
         Value::Null | Value::Bool(_) => false,
+    }
+}
+
+/// Length of the longest list.
+fn longest(value: &Value) -> usize {
+    match value {
+        Value::Array(items) => items.iter().map(longest).fold(items.len(), usize::max),
+        Value::Object(map) => map.values().map(longest).max().unwrap_or(0),
+        _ => 0,
     }
 }
 

@@ -1,6 +1,6 @@
 //! Point orders of pose estimators: one table, a line per layout.
 
-/// A layout, identified by its number of points.
+/// A layout, identified by its number of points, and by their places where two have one number.
 #[derive(Debug, PartialEq)]
 pub struct Layout {
     pub name: &'static str,
@@ -25,6 +25,9 @@ pub const LAYOUTS: [Layout; 10] = [
 
 /// Points by name instead of number.
 pub const NAMED: Layout = Layout { name: "named points", count: NAMES.len(), points: &NAMES };
+
+/// Of OpenPose's experimental models.
+pub const BODY_25B: Layout = Layout { name: "OpenPose BODY_25B", count: 25, points: &BODY_25B_POINTS };
 
 /// Estimators of 3-D poses mostly use this order.
 pub const HUMAN36M: Layout = Layout { name: "Human3.6M", count: 17, points: &HUMAN36M_17 };
@@ -152,6 +155,33 @@ const BODY_25: [&str; 25] = [
     "left eye",
     "right ear",
     "left ear",
+    "left big toe",
+    "left small toe",
+    "left heel",
+    "right big toe",
+    "right small toe",
+    "right heel",
+];
+const BODY_25B_POINTS: [&str; 25] = [
+    "nose",
+    "left eye",
+    "right eye",
+    "left ear",
+    "right ear",
+    "ls",
+    "rs",
+    "le",
+    "re",
+    "lw",
+    "rw",
+    "lh",
+    "rh",
+    "lk",
+    "rk",
+    "la",
+    "ra",
+    "neck",
+    "head top",
     "left big toe",
     "left small toe",
     "left heel",
@@ -294,7 +324,7 @@ mod tests {
 
     #[test]
     fn every_layout_has_the_limbs_of_both_sides_once() {
-        for layout in LAYOUTS.iter().chain([&HUMAN36M]) {
+        for layout in LAYOUTS.iter().chain([&BODY_25B, &HUMAN36M]) {
             let places: Vec<usize> = layout.places().flatten().collect();
             let named = layout.points.iter().filter(|point| !point.is_empty()).count();
             assert_eq!(places.len(), named, "{}: an unknown name", layout.name);

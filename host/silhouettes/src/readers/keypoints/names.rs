@@ -1,5 +1,7 @@
 //! Names of frames, such as those of pictures: their order, the numbers missing between them, and whether they are one sequence.
 
+use std::collections::HashMap;
+
 /// Ordered by its numbers, so that `frame_9` comes before `frame_10`.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Name {
@@ -48,15 +50,18 @@ fn step(from: &Name, to: &Name) -> Option<u128> {
     after.1.checked_sub(before.1).filter(|_| alone)
 }
 
-/// Place of the first number in which names of the same texts differ.
+/// Place of the first number in which names of the same texts differ. Numbers with one of these between them, as those of a
+/// time, are one.
 fn counted(from: &Name, to: &Name) -> Option<usize> {
     let pairs = || from.pieces.iter().zip(&to.pieces);
     let alike = from.pieces.len() == to.pieces.len() && pairs().all(|(from, to)| from.0 == to.0);
-    pairs().position(|(from, to)| from.1 != to.1).filter(|_| alike)
+    let place = pairs().position(|(from, to)| from.1 != to.1).filter(|_| alike)?;
+    let is_joined = |(text, _): &&(String, u128)| [".", ",", ":", "-", "_"].contains(&text.as_str());
+    Some(place - to.pieces[1..=place].iter().rev().take_while(is_joined).count())
 }
 
 /// Reports names of several sequences, such as pictures of several folders, or of none.
-fn sequences(names: &[Name]) -> Option<String> {
+fn sequences<'a>(names: &'a [Name]) -> Option<String> {
     /// Mean length of sequences; fewer names are not those of a recording.
     const LEAST: usize = 3;
     const SHOWN: usize = 3;
@@ -64,11 +69,20 @@ fn sequences(names: &[Name]) -> Option<String> {
     if names.iter().all(|name| name.text.parse::<f64>().is_ok()) {
         return None;
     }
+    let texts =
+        |name: &'a Name| -> Vec<&'a str> { name.pieces.iter().map(|(text, _)| text.as_str()).collect() };
     let places: Vec<Option<usize>> = names.windows(2).map(|pair| counted(&pair[0], &pair[1])).collect();
+    let steps = || places.iter().zip(names.iter().skip(1));
+    let mut counting: HashMap<Vec<&str>, Option<usize>> = HashMap::new();
+    for (place, name) in steps() {
+        let most = counting.entry(texts(name)).or_default();
+        *most = (*most).max(*place);
+    }
     // A number before the one that counts begins another sequence.
-    let counting = places.iter().copied().flatten().max();
-    let begins = places.iter().zip(names.iter().skip(1));
-    let begins = begins.filter(|(place, _)| place.is_none() || **place < counting).map(|(_, name)| name);
+    let begins = steps().filter(|&(place, name)| {
+        place.is_none() || counting.get(&texts(name)).is_some_and(|most| place < most)
+    });
+    let begins = begins.map(|(_, name)| name);
     let first: Vec<&Name> = names.iter().take(1).chain(begins).collect();
     if first.len() < 2 {
         return None;
@@ -77,13 +91,11 @@ fn sequences(names: &[Name]) -> Option<String> {
     let shown = format!("{}{}", shown.join(", "), if first.len() > SHOWN { ", ..." } else { "" });
     Some(if names.len() >= LEAST * first.len() {
         format!(
-            "names of frames form {} sequences, which begin with {shown}: they are read as one recording, and several need a file each",
+            "names of frames form {} sequences, which begin with {shown}: they are read as one recording; give each recording a file of its own",
             first.len()
         )
     } else {
-        format!(
-            "names of frames form no numbered sequence ({shown}): pictures that are not of one video do not make a recording"
-        )
+        format!("names of frames form no numbered sequence ({shown}): give the frames of one video")
     })
 }
 
@@ -111,6 +123,10 @@ mod tests {
             found.contains("4 sequences, which begin with take1/0001.jpg") && found.contains(", ...:"),
             "{found}"
         );
+        let of_two_kinds: Vec<String> =
+            (1..=9).flat_map(|n| [format!("a1/b{n}.jpg"), format!("cer-kratasy/{n}.jpg")]).collect();
+        let found = remarks(&of_two_kinds);
+        assert!(found.contains("2 sequences, which begin with a1/b1.jpg, cer-kratasy/1.jpg:"), "{found}");
         let photos =
             ["park_jpg.rf.0a1.jpg", "street-7_jpg.rf.9b.jpg", "beach_jpg.rf.77.jpg"].map(str::to_owned);
         let found = remarks(&photos);
@@ -126,6 +142,9 @@ mod tests {
             of(|n| format!("walk-{n}_jpg.rf.{:x}.jpg", n * 7919 % 4096)),
             of(|n| format!("frame_{n:03}_{}.{:03}s.png", n / 30, n % 30 * 33)),
             of(|n| format!("{}.{:06}", n / 30, n % 30 * 33_000)),
+            of(|n| format!("00:00:{:02}.{:03}", n / 30, n % 30 * 33)),
+            of(|n| format!("2024-05-01_12-{:02}-{:02}", n / 30, n % 30 * 2)),
+            of(|n| format!("2018-07-04T12_07_{:02}.{:06}.jpg", n / 30, n % 30 * 33_000)),
             vec!["one.png".into()],
         ] {
             assert_eq!(remarks(&names), "", "{names:?}");

@@ -6,7 +6,6 @@ use super::{
     json::{first_number, number},
     labels::{self, labels},
     layouts::{Layout, NAMED, NAMES},
-    spatial::HIGHEST_CONFIDENCE,
 };
 use crate::silhouette::capsule::Point3;
 
@@ -113,17 +112,12 @@ pub fn points_of(items: &[Value], confidences: Option<&[Value]>) -> Option<Perso
     let flat = items.iter().any(|item| number(item).is_some());
     let labels = labels(items);
     let (layout, in_triples, mut raw): (_, _, Vec<Raw>) = if flat {
-        // No two layouts share a length.
         let (layout, width) = [3, 2, 4].iter().find_map(|width| {
             let layout =
                 Layout::of(items.len() / width).filter(|layout| layout.count * width == items.len())?;
-            let fits = match width {
-                2 => !are_triples(items),
-                // Only MediaPipe's; 60 and 72 numbers are 20 and 24 joints.
-                4 => layout.has_picture_depth() || !items.len().is_multiple_of(3),
-                _ => true,
-            };
-            fits.then_some((layout, *width))
+            // Joints in succession are near each other: numbers of a length of several layouts may be triples of another.
+            let are_triples = items.len().is_multiple_of(3) && change(items, *width) > change(items, 3);
+            (!are_triples).then_some((layout, *width))
         })?;
         (layout, width == 3, items.chunks_exact(width).map(of_numbers).collect())
     } else {
@@ -140,15 +134,12 @@ pub fn points_of(items: &[Value], confidences: Option<&[Value]>) -> Option<Perso
     Some(Person { raw, layout, id: None, labels, in_triples, points: Vec::new() })
 }
 
-/// Numbers of a length of several layouts in pairs that are triples of another: every third is a score, or many are negative as in
-/// space.
-fn are_triples(items: &[Value]) -> bool {
-    let values: Vec<f64> = items.iter().map(|item| number(item).unwrap_or(f64::NAN)).collect();
-    let is_score = |value: &f64| (0.0..=HIGHEST_CONFIDENCE).contains(value);
-    let thirds = values.iter().skip(2).step_by(3).all(is_score);
-    let outside = values.iter().filter(|value| !is_score(value)).count();
-    let negative = values.iter().filter(|value| **value < 0.0).count();
-    values.len().is_multiple_of(3) && (thirds && 3 * outside > values.len() || 4 * negative >= values.len())
+/// Mean difference of numbers `width` apart, without zeros, which are missing points.
+fn change(items: &[Value], width: usize) -> f64 {
+    let seen = |item: &Value| number(item).filter(|value| value.is_finite() && *value != 0.0);
+    let pairs = items.iter().zip(items.iter().skip(width));
+    let steps: Vec<f64> = pairs.filter_map(|(from, to)| Some((seen(from)? - seen(to)?).abs())).collect();
+    steps.iter().sum::<f64>() / steps.len() as f64
 }
 
 /// Points under their names as keys; other values are ignored.
@@ -177,10 +168,16 @@ pub fn annotated(annotation: &Value, names: &[String]) -> Option<Person> {
 
 fn point(value: &Value) -> Option<Raw> {
     match value {
-        Value::Array(numbers) if (2..=4).contains(&numbers.len()) => Some(of_numbers(numbers)),
+        Value::Array(numbers) if (2..=4).contains(&numbers.len()) && !numbers.iter().any(is_nested) => {
+            Some(of_numbers(numbers))
+        }
         Value::Object(map) => of_object(map),
         _ => None,
     }
+}
+
+fn is_nested(value: &Value) -> bool {
+    value.is_array() || value.is_object()
 }
 
 fn of_numbers(numbers: &[Value]) -> Raw {
@@ -197,7 +194,8 @@ fn of_object(map: &Map<String, Value>) -> Option<Raw> {
         ["visibility", "score", "confidence", "c"].iter().find_map(|key| map.get(*key).and_then(number));
     // PoseNet nests the position.
     let place = map.get("position").and_then(Value::as_object).unwrap_or(map);
-    let [x, y] = ["x", "y"].map(|key| place.get(key).map(|value| number(value).unwrap_or(f64::NAN)));
+    let own = |key: &str| place.get(key).filter(|value| !is_nested(value));
+    let [x, y] = ["x", "y"].map(|key| own(key).map(|value| number(value).unwrap_or(f64::NAN)));
     Some(Raw { x: x?, y: y?, third: place.get("z").and_then(number), sure: sure.or(Some(1.0)) })
 }
 

@@ -1,13 +1,14 @@
 //! Keypoints in three dimensions: whether a file's third numbers are coordinates, and the order of its points.
 
 use super::{
-    layouts::{HUMAN36M, Layout, NAMED, NAMES},
+    layouts::{BODY_25B, HUMAN36M, Layout, NAMED, NAMES},
+    people::distance,
     points::{Person, Raw},
 };
 use crate::{readers::recording::RecordingError, silhouette::capsule::Point3};
 
 /// Confidences exceed 1 slightly in some programs.
-pub const HIGHEST_CONFIDENCE: f64 = 1.2;
+const HIGHEST_CONFIDENCE: f64 = 1.2;
 /// Share of points outside the range of confidences, or of the picture.
 const LEAST_SHARE: f64 = 0.05;
 const MOST_ASYMMETRY: f64 = 0.25;
@@ -97,6 +98,28 @@ pub fn layout<'a>(
              to a CSV file with columns NAME_x, NAME_y, NAME_z"
         ),
     })
+}
+
+/// The order of points of a picture. The second of OpenPose's BODY_25 is the neck, in the middle of the shoulders.
+pub fn picture_layout<'a>(
+    people: impl Iterator<Item = &'a Person> + Clone,
+    own: &'static Layout,
+) -> &'static Layout {
+    const NEAR: f64 = 0.3;
+    if own.count != BODY_25B.count {
+        return own;
+    }
+    let point = |person: &Person, place: usize| person.raw.get(place)?.in_picture();
+    let (mut away, mut wide) = (0.0, 0.0);
+    for person in people.clone() {
+        if let (Some(neck), Some(right), Some(left)) = (point(person, 1), point(person, 2), point(person, 5))
+        {
+            away += distance(neck, std::array::from_fn(|k| 0.5 * (right[k] + left[k])));
+            wide += distance(right, left);
+        }
+    }
+    let differ = |order: &Layout| asymmetry(people.clone(), order, point).unwrap_or(f64::INFINITY);
+    if away > NEAR * wide && differ(&BODY_25B) < differ(own) { &BODY_25B } else { own }
 }
 
 /// Mean difference of left and right limbs relative to their length, `None` without limbs of both sides; `point` is that of a

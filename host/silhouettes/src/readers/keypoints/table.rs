@@ -44,7 +44,11 @@ pub fn read(
     let is_point = |name: &str| columns.iter().filter_map(coordinate).any(|(own, _)| own == name);
     // One kind counts: some tables have a score and a visibility of each point.
     let kind = columns.iter().filter_map(confidence).find_map(|(name, kind)| is_point(name).then_some(kind));
-    let markers = markers_of::<4>(columns, |column| field(column, kind))?;
+    // Boxes have an x1, y1, x2 and y2.
+    let has_names = columns.iter().any(|column| coordinate(column).is_some());
+    let markers = markers_of::<4>(columns, |column| {
+        field(column, kind).or_else(|| numbered(column).filter(|_| !has_names))
+    })?;
     let has_z = markers.iter().any(|(_, [_, _, depth, _])| depth.is_some());
     let points: Vec<Column> = markers
         .into_iter()
@@ -97,7 +101,8 @@ pub fn read(
                 }
             }
             let next = ids.len() as i64;
-            let is_named = !(track.is_empty() && prefix.is_empty());
+            // Without numbers of frames each row is one.
+            let is_named = frame.is_none() || !(track.is_empty() && prefix.is_empty());
             let id = is_named.then(|| *ids.entry((track, *prefix)).or_insert(next));
             people.push(Person { labels: numbers.clone(), ..Person::named(raw, id) });
         }
@@ -168,7 +173,7 @@ fn confidence(column: &str) -> Option<(&str, &'static str)> {
     Some((name, kind))
 }
 
-/// Name of a point, and 0 for x, 1 for y, 2 for z, 3 for the confidence of this kind, or for `v1` of a numbered point.
+/// Name of a point, and 0 for x, 1 for y, 2 for z, 3 for the confidence of this kind.
 fn field<'a>(column: &'a str, kind: Option<&str>) -> Option<(&'a str, usize)> {
     let mocapnet = MOCAPNET.iter().zip([0, 1, 3]).find_map(|(start, axis)| {
         let (begin, name) = column.split_at_checked(start.len())?;
@@ -178,14 +183,15 @@ fn field<'a>(column: &'a str, kind: Option<&str>) -> Option<(&'a str, usize)> {
         let (name, own) = confidence(column)?;
         (Some(own) == kind).then_some((name, 3))
     };
-    let numbered = || {
-        let axis =
-            ['x', 'y', 'z', 'v'].iter().position(|axis| column.to_ascii_lowercase().starts_with(*axis))?;
-        let number = column[1..].trim_start_matches('_');
-        let is_number = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
-        is_number.then_some((number, axis))
-    };
-    mocapnet.or_else(|| coordinate(column)).or_else(sure).or_else(numbered)
+    mocapnet.or_else(|| coordinate(column)).or_else(sure)
+}
+
+/// Number of a point, and 0 for `x1`, 1 for `y1`, 2 for `z1`, 3 for the confidence `v1`.
+fn numbered(column: &str) -> Option<(&str, usize)> {
+    let axis = ['x', 'y', 'z', 'v'].iter().position(|axis| column.to_ascii_lowercase().starts_with(*axis))?;
+    let number = column[1..].trim_start_matches('_');
+    let is_number = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
+    is_number.then_some((number, axis))
 }
 
 #[cfg(test)]
@@ -277,6 +283,25 @@ mod tests {
             "{:?}",
             found.remarks()
         );
+    }
+
+    #[test]
+    fn a_table_without_numbers_of_frames_has_one_person_however_they_leap() {
+        let header = cells(|name, _| format!("{name}_x,{name}_y"));
+        let row = |x: f64| format!("a{}\n", cells(|_, [at, y]| format!("{},{y}", at + x)));
+        let rows: String = (0..6).map(|frame| row(if frame < 3 { 0.0 } else { 600.0 })).collect();
+        let found = expect_person(&format!("take{header}\n{rows}"), 6);
+        assert!(!found.by_name(5).is_empty(), "{:?}", found.remarks());
+        assert!(!found.remarks().join("; ").contains("people"), "{:?}", found.remarks());
+    }
+
+    #[test]
+    fn boxes_next_to_named_points_are_no_points() {
+        let header = cells(|name, _| format!("{name}_x,{name}_y"));
+        let row = cells(|_, [x, y]| format!("{x},{y}"));
+        let found = expect_person(&format!("frame,x1,y1,x2,y2,x_1{header}\n0,1,2,3,4,5{row}\n"), 1);
+        let remarks = found.remarks().join("; ");
+        assert!(remarks.contains("13 of 13 named points"), "{remarks}");
     }
 
     #[test]

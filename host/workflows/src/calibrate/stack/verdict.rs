@@ -45,8 +45,9 @@ pub fn verdict(found: &StackLens) -> String {
     match (inaccurate(found), found.fixed_pattern) {
         (None, _) => "good".into(),
         (Some(_), Some(pattern)) => format!(
-            "{:.0} % of the sharpest slice's finest detail is the same in the most defocused slices: it is of the camera (response of \
-             its pixels, dust) and hides the blur; clean the sensor, or learn it by farnear calibrate camera and give --camera-frames",
+            "{:.0} % of the sharpest slice's finest detail is the same in the most defocused slices: it is probably of the \
+             camera (response of its pixels, dust) and hides the blur; clean the sensor, or measure it with farnear calibrate camera and \
+             give --camera-frames",
             100.0 * pattern
         ),
         (Some(advice), None) => advice,

@@ -349,14 +349,31 @@ fn exposures_of_any_factor_cost_nothing() {
 fn exchanged_images_are_named() {
     let good = true_stack(&even_positions());
     assert_eq!(checked(&good, &even_positions(), None).exchanged, [[0; 2]; 0]);
+    let mut reasons = Vec::new();
     for pair in [[5, 7], [6, 9], [5, 9], [7, 8]] {
         let mut images = good.clone();
         images.swap(pair[0], pair[1]);
-        assert_eq!(checked(&images, &even_positions(), None).exchanged, [pair]);
+        let found = checked(&images, &even_positions(), None);
+        assert_eq!(found.exchanged, [pair]);
+        reasons.extend(found.left_out.into_iter().map(|(_, reason)| reason));
         // Numbers count all images.
         images[2] = mean(&scene(2), 3);
         let found = checked(&images, &even_positions(), None);
         assert_eq!(found.exchanged, [pair], "{:?}", found.left_out);
+    }
+    assert!(!reasons.is_empty() && reasons.iter().all(|reason| reason.contains("exchanged")), "{reasons:?}");
+}
+
+#[test]
+fn a_moved_frame_is_left_out_as_such_and_kept_if_aligned() {
+    for at in [0, COUNT - 1] {
+        let mut images = stack();
+        let still = images[at].clone();
+        images[at] = Array2::from_shape_fn(still.dim(), |(y, x)| still[(y, (x + 8) % 96)]);
+        let found = checked(&images, &(0..COUNT).map(|index| index as f64).collect::<Vec<_>>(), None);
+        let [(index, reason)] = &found.left_out[..] else { panic!("{at}: {:?}", found.left_out) };
+        assert!(*index == at && reason.contains("--align similarity keeps it"), "{at}: {reason}");
+        assert_eq!(left_out(&images, Some(Model::Similarity)), [0; 0]);
     }
 }
 

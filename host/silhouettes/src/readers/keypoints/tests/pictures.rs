@@ -26,6 +26,8 @@ fn the_shape_of_the_picture_is_that_of_the_caller() {
     assert!(wide(&read_as(&parts, Choices::default())) > 0.6, "of 4:3, as the file states");
     let remarks = read_as(&json(1.0, 1.0), portrait).remarks().join("; ");
     assert!(remarks.contains("--aspect 9:16 is ignored"), "{remarks}");
+    let markers = read(b"A_x,A_y,A_z\n1,2,3\n", "csv", portrait).expect("markers");
+    assert!(markers.remarks().join("; ").contains("--aspect 9:16 is ignored"), "{:?}", markers.remarks());
 }
 
 #[test]
@@ -44,6 +46,20 @@ fn a_category_that_the_file_does_not_list_is_reported() {
 }
 
 #[test]
+fn pictures_with_a_list_of_few_people_each_are_frames() {
+    let forms: [fn(&str) -> String; 2] = [str::to_owned, |points| format!(r#"{{"keypoints":{points}}}"#)];
+    for of_person in forms {
+        let people = |frame: usize| {
+            let of = |x: f64| of_person(&lists(&person(layout(17), x + frame as f64)));
+            format!(r#""f{frame:02}":[{},{}]"#, of(100.0), of(400.0))
+        };
+        let json = format!("{{{}}}", (1..=8).map(people).collect::<Vec<_>>().join(","));
+        let remarks = upright(&json, 8).remarks().join("; ");
+        assert!(remarks.contains("2 people"), "{remarks}");
+    }
+}
+
+#[test]
 fn pictures_of_two_recordings_are_reported() {
     let points = flat(&person(layout(17), 100.0));
     let json = |folders: &[&str]| {
@@ -56,4 +72,12 @@ fn pictures_of_two_recordings_are_reported() {
     assert!(remarks.contains("2 sequences, which begin with run/001.jpg, walk/001.jpg"), "{remarks}");
     let remarks = upright(&json(&["walk"]), 4).remarks().join("; ");
     assert!(!remarks.contains("sequence"), "{remarks}");
+}
+
+#[test]
+fn the_two_layouts_of_25_points_are_distinguished_by_the_neck() {
+    let json =
+        format!(r#"{{"people":[{{"pose_keypoints_2d":{}}}]}}"#, flat(&person(&layouts::BODY_25B, 100.0)));
+    let remarks = upright(&json, 1).remarks().join("; ");
+    assert!(remarks.contains("25 keypoints of the layout OpenPose BODY_25B"), "{remarks}");
 }

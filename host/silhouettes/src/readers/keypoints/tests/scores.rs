@@ -46,14 +46,31 @@ fn scores_of_heat_maps_next_to_pixels_are_no_depths_in_any_format() {
 #[test]
 fn triples_of_an_unknown_layout_are_neither_pairs_nor_quadruples() {
     // Pixels with scores, and places about the hips.
-    let others: [fn(usize) -> f64; 2] =
-        [|n| if n % 3 == 2 { 0.9 } else { 100.0 + 7.0 * n as f64 }, |n| (n * 37 % 90) as f64 / 50.0 - 0.9];
-    for (count, other) in [36, 60, 66, 72].into_iter().flat_map(|count| others.map(|other| (count, other))) {
-        let numbers: Vec<String> = (0..count).map(|n| other(n).to_string()).collect();
-        let json = format!(r#"[{{"keypoints":[{}]}}]"#, numbers.join(","));
+    let others = [person(layout(26), 100.0), about_the_hips(layout(26))];
+    for (count, other) in
+        [12, 20, 22, 24].into_iter().flat_map(|count| others.iter().map(move |o| (count, o)))
+    {
+        let json = format!(r#"[{{"keypoints":{}}}]"#, flat(&other[..count]));
         let error = read(json.as_bytes(), "json", Choices::default()).expect_err("no layout").to_string();
-        assert!(error.contains("it holds no person's points"), "{count}: {error}");
+        let expected = format!("no person's points, the longest list in a frame has {} values", 3 * count);
+        assert!(error.contains(&expected), "{count}: {error}");
     }
     let pairs: Vec<String> = person(layout(33), 100.0).iter().map(|[x, y, _]| format!("{x},{y}")).collect();
     upright(&format!("[[{0}],[{0}]]", pairs.join(",")), 2);
+}
+
+fn about_the_hips(layout: &Layout) -> Vec<[f64; 3]> {
+    in_space(layout).into_iter().map(|[x, y, z]| [x, y, z - 0.9]).collect()
+}
+
+#[test]
+fn pairs_about_the_hips_and_quadruples_are_no_triples() {
+    let pairs: Vec<String> =
+        person(layout(18), 0.0).iter().map(|[x, y, _]| format!("{x},{}", y - 100.0)).collect();
+    upright(&format!(r#"[{{"keypoints":[{}]}}]"#, pairs.join(",")), 1);
+    for count in [15, 18] {
+        let points = about_the_hips(layout(count));
+        let quadruples: Vec<String> = points.iter().map(|[x, y, z]| format!("{x},{y},{z},0.9")).collect();
+        upright_in_space(&format!(r#"[{{"keypoints":[{}]}}]"#, quadruples.join(",")));
+    }
 }
