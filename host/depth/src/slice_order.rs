@@ -51,7 +51,7 @@ pub fn sharpness(image: ArrayView2<f32>) -> Vec<f64> {
 
 /// The [`sharpness`] of the slices of a stack in the blocks that all of them show and that have detail in any.
 pub fn comparable(measured: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    /// Less detail than this part of the largest sharpness is none.
+    /// Detail below this part of the largest sharpness does not count.
     const LEAST: f64 = 1e-4;
     let least = LEAST * measured.iter().flatten().copied().fold(0.0, f64::max);
     let of = |block: usize| measured.iter().filter(|slice| !slice.is_empty()).map(move |slice| slice[block]);

@@ -67,7 +67,7 @@ impl Frames {
         Self { warps, gains, left_out, untold, exchanged, wrapped: None, usual: None, drift_px: 0.0 }
     }
 
-    /// Adds an image that is none of the stack's own.
+    /// Adds an image that does not belong to the stack.
     fn insert_composed(&mut self, composed: usize) {
         let left_out = self.left_out.iter_mut().map(|(index, _)| index);
         let others =
