@@ -49,18 +49,27 @@ pub fn sharpness(image: ArrayView2<f32>) -> Vec<f64> {
     parts.into_iter().map(measured).collect()
 }
 
-/// The [`sharpness`] of the slices of a stack in the blocks that all of them show and that have detail in any.
+/// The [`sharpness`] of the slices of a stack in the blocks that all of them show and that have detail in any; empty for a
+/// slice that shows less than half.
 pub fn comparable(measured: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    /// Detail below this part of the largest sharpness does not count.
+    /// Detail below this part of the largest sharpness of a usual slice does not count.
     const LEAST: f64 = 1e-4;
-    let least = LEAST * measured.iter().flatten().copied().fold(0.0, f64::max);
-    let of = |block: usize| measured.iter().filter(|slice| !slice.is_empty()).map(move |slice| slice[block]);
-    let blocks = measured.iter().map(Vec::len).max().unwrap_or(0);
+    // A slice that shows little must not cost the others their blocks, nor noise in a black one their detail.
+    let tells = |slice: &Vec<f64>| {
+        let seen = slice.iter().filter(|value| value.is_finite()).count();
+        seen > 0 && 2 * seen >= slice.len()
+    };
+    let telling = || measured.iter().filter(|slice| tells(slice));
+    let mut largest: Vec<f64> = telling().map(|slice| slice.iter().copied().fold(0.0, f64::max)).collect();
+    largest.sort_unstable_by(f64::total_cmp);
+    let least = LEAST * largest.get(largest.len() / 2).copied().unwrap_or(0.0);
+    let blocks = telling().map(Vec::len).max().unwrap_or(0);
+    let of = |block: usize| telling().map(move |slice| slice[block]);
     let is_kept = |block: &usize| of(*block).all(f64::is_finite) && of(*block).any(|value| value > least);
     let kept: Vec<usize> = (0..blocks).filter(is_kept).collect();
-    let of_slice = |slice: &Vec<f64>| match slice.is_empty() {
-        true => Vec::new(),
-        false => kept.iter().map(|block| slice[*block].max(least)).collect(),
+    let of_slice = |slice: &Vec<f64>| match tells(slice) {
+        true => kept.iter().map(|block| slice[*block].max(least)).collect(),
+        false => Vec::new(),
     };
     measured.iter().map(of_slice).collect()
 }
@@ -375,6 +384,20 @@ mod tests {
         images.insert(6, scene(1));
         images.iter_mut().for_each(dark);
         assert_eq!(composed(&measured(&images)), Some(6));
+    }
+
+    #[test]
+    fn a_black_slice_and_one_that_shows_little_cost_the_others_nothing() {
+        let good = stack(&even(15), [3.0, 11.0], 0.02);
+        let mut black = Array2::zeros(good[0].dim());
+        black[(5, 5)] = 1e-3;
+        let mut cut = good[8].clone();
+        cut.slice_mut(s![.., 30..]).fill(f32::NAN);
+        let usual = measured(&good);
+        for bad in [black, cut] {
+            let all = measured(&[good.clone(), vec![bad]].concat());
+            assert!(all[..15] == usual, "{:?}", all[0]);
+        }
     }
 
     #[test]

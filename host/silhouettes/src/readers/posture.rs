@@ -1,6 +1,5 @@
 //! Whether a recorded person is upright: the head above the feet along the upward axis. A person upside-down means that
-//! the other direction is up. A person who is longer than high may lie, unless the feet are on the ground of another axis and
-//! the body is not on that of the usual one.
+//! the other direction is up. A person who is longer than high may lie, unless the feet are on the ground of another axis.
 
 use super::recording::{Known, Source, Up};
 use crate::silhouette::{anatomy::Anatomy, capsule::Point3};
@@ -13,8 +12,6 @@ const UPRIGHT: f64 = 0.8;
 const LONGER: f64 = 1.4;
 /// Height of the feet above the origin over that of the head above the feet, of a person who stands on the ground.
 const ON_GROUND: std::ops::RangeInclusive<f64> = -0.05..=0.15;
-/// Heights of all points above the origin over the way from the feet to the head, of a person who lies on the ground.
-const LYING_ON_GROUND: std::ops::RangeInclusive<f64> = -0.05..=0.25;
 
 fn mean(frame: &[Option<Point3>], places: &[usize]) -> Option<Point3> {
     let at = |place: &usize| frame.get(*place).copied().flatten();
@@ -61,16 +58,8 @@ fn standing(ways: &[Point3], frames: &Frames, anatomy: &Anatomy) -> Option<(Up, 
     (2 * count > ways.len() && is_along && ON_GROUND.contains(&(feet / high))).then_some((up, count))
 }
 
-/// Whether most frames show a person of this length who lies on the ground.
-fn lies_on_ground(up: Up, length: f64, frames: &Frames, anatomy: &Anatomy) -> bool {
-    let is_low = |point: &Point3| LYING_ON_GROUND.contains(&(up.height(*point) / length));
-    let shown =
-        || frames.iter().map(|frame| body_points(frame, &anatomy.body)).filter(|points| !points.is_empty());
-    2 * shown().filter(|points| points.iter().all(is_low)).count() > shown().count()
-}
-
 /// Reverses an upward axis that was not stated where the head is below the feet in most frames, and replaces one that only the
-/// format implies where the person stands along another and does not lie on its ground; a remark where it was stated.
+/// format implies where the person stands along another; a remark where it was stated.
 pub fn checked(
     up: Known<Up>,
     frames: &Frames,
@@ -83,7 +72,6 @@ pub fn checked(
         && up.source == Source::Format
         && !planar
         && ![value, value.reversed()].contains(&best)
-        && !lies_on_ground(value, best.height(sum(&ways)) / all as f64, frames, anatomy)
     {
         let reason = format!(
             "for the head is above the feet along it in {count} of {all} frames, and the feet are on its ground"
@@ -161,12 +149,8 @@ mod tests {
 
     /// A body with its head 1.7 m above its feet along `up`, arms spread, and points that no template names.
     fn body(up: Up, feet_mm: f64) -> String {
-        moved(up, [0.0, feet_mm])
-    }
-
-    fn moved(up: Up, [behind_mm, feet_mm]: [f64; 2]) -> String {
         let turned = |[x, y, z]: [f64; 3]| {
-            let point = [x, y + behind_mm, z + feet_mm - 100.0];
+            let point = [x, y, z + feet_mm - 100.0];
             // Inverse of the rotation to z up.
             let columns = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| up.to_z(axis));
             columns.map(|column| (0..3).map(|k| column[k] * point[k]).sum::<f64>().to_string()).join(",")
@@ -219,18 +203,6 @@ mod tests {
                 "{remarks:?}"
             );
             assert!(!is_upright(&recording(&body(up, 100.0), Some(Up::Z))), "{up}");
-        }
-    }
-
-    #[test]
-    fn a_person_who_lies_on_the_ground_with_the_feet_at_the_origin_stays() {
-        for (up, behind_mm) in [(Up::X, 150.0), (Up::MinusY, 150.0), (Up::Y, -250.0), (Up::MinusX, -250.0)] {
-            let text = moved(up, [behind_mm, 100.0]);
-            let lying = recording(&text, None);
-            assert!(!is_upright(&lying) && lying.up.value == Up::Z, "{up}");
-            let remarks = lying.remarks();
-            assert!(remarks[0].starts_with("longer than high in 2 of 2 frames"), "{remarks:?}");
-            assert!(is_upright(&recording(&text, Some(up))), "{up}");
         }
     }
 

@@ -330,7 +330,7 @@ where
             frames.warps[index] = warp.after(&back);
             if few_shaken && shaken.frames.contains(&index) {
                 let reason = if frames.exchanged.iter().any(|[a, b]| (a..=b).contains(&&index)) {
-                    "it does not fit into the order, for images look exchanged here"
+                    "it is less sharp in most places than its neighbours suggest: images look exchanged here, or it is shaken or defocused"
                 } else {
                     "it is shaken or defocused: less sharp in most places than its neighbours suggest"
                 };

@@ -56,7 +56,7 @@ fn counted(from: &Name, to: &Name) -> Option<usize> {
     let pairs = || from.pieces.iter().zip(&to.pieces);
     let alike = from.pieces.len() == to.pieces.len() && pairs().all(|(from, to)| from.0 == to.0);
     let place = pairs().position(|(from, to)| from.1 != to.1).filter(|_| alike)?;
-    let is_joined = |(text, _): &&(String, u128)| [".", ",", ":", "-", "_"].contains(&text.as_str());
+    let is_joined = |(text, _): &&(String, u128)| [".", ",", ":", "-"].contains(&text.as_str());
     Some(place - to.pieces[1..=place].iter().rev().take_while(is_joined).count())
 }
 
@@ -123,6 +123,8 @@ mod tests {
             found.contains("4 sequences, which begin with take1/0001.jpg") && found.contains(", ...:"),
             "{found}"
         );
+        let found = remarks(&[numbered("video1_"), numbered("video2_")].concat());
+        assert!(found.contains("2 sequences, which begin with video1_0001.jpg, video2_0001.jpg:"), "{found}");
         let of_two_kinds: Vec<String> =
             (1..=9).flat_map(|n| [format!("a1/b{n}.jpg"), format!("cer-kratasy/{n}.jpg")]).collect();
         let found = remarks(&of_two_kinds);

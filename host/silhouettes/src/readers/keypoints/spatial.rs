@@ -118,8 +118,9 @@ pub fn picture_layout<'a>(
             wide += distance(right, left);
         }
     }
-    let differ = |order: &Layout| asymmetry(people.clone(), order, point).unwrap_or(f64::INFINITY);
-    if away > NEAR * wide && differ(&BODY_25B) < differ(own) { &BODY_25B } else { own }
+    let differ = |order: &Layout| asymmetry(people.clone(), order, point);
+    let is_other = differ(own).zip(differ(&BODY_25B)).is_some_and(|(own, other)| other < own);
+    if away > NEAR * wide && is_other { &BODY_25B } else { own }
 }
 
 /// Mean difference of left and right limbs relative to their length, `None` without limbs of both sides; `point` is that of a

@@ -76,8 +76,20 @@ fn pictures_of_two_recordings_are_reported() {
 
 #[test]
 fn the_two_layouts_of_25_points_are_distinguished_by_the_neck() {
-    let json =
-        format!(r#"{{"people":[{{"pose_keypoints_2d":{}}}]}}"#, flat(&person(&layouts::BODY_25B, 100.0)));
-    let remarks = upright(&json, 1).remarks().join("; ");
-    assert!(remarks.contains("25 keypoints of the layout OpenPose BODY_25B"), "{remarks}");
+    let mut hidden = person(layout(25), 100.0);
+    // From the side, with the left arm and leg behind the body.
+    hidden[5] = hidden[2];
+    for place in [6, 13] {
+        hidden[place] = [0.0; 3];
+    }
+    for (points, layout) in [
+        (person(layout(25), 100.0), "BODY_25,"),
+        (hidden, "BODY_25,"),
+        (person(&layouts::BODY_25B, 100.0), "BODY_25B,"),
+    ] {
+        let json = format!(r#"{{"people":[{{"pose_keypoints_2d":{}}}]}}"#, flat(&points));
+        let found = read(json.as_bytes(), "json", Choices::default()).expect("a person");
+        let remarks = found.remarks().join("; ");
+        assert!(remarks.contains(&format!("layout OpenPose {layout}")), "{remarks}");
+    }
 }
