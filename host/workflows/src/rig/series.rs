@@ -69,8 +69,17 @@ fn wait(due: Instant, context: &Context<'_>) -> Result<()> {
     if left() > SAID {
         context.info(&format!("the next pair is due in {:.0} s", left().as_secs_f64()));
     }
+    let whole = left();
     while !left().is_zero() {
         context.cancel.check("capturing a series")?;
+        if whole > SAID {
+            let passed = whole.saturating_sub(left()).as_secs() as usize;
+            context.progress.advance(
+                "seconds until the next pair",
+                passed,
+                Some(whole.as_secs() as usize + 1),
+            );
+        }
         thread::sleep(left().min(LOOK));
     }
     context.cancel.check("capturing a series")
