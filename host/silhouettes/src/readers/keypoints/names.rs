@@ -91,7 +91,7 @@ fn sequences<'a>(names: &'a [Name]) -> Option<String> {
     let shown = format!("{}{}", shown.join(", "), if first.len() > SHOWN { ", ..." } else { "" });
     Some(if names.len() >= LEAST * first.len() {
         format!(
-            "names of frames form {} sequences, which begin with {shown}: they are read as one recording; give each recording a file of its own",
+            "names of frames form {} sequences, which begin with {shown}: they are read as one recording; put each recording into a separate file",
             first.len()
         )
     } else {
