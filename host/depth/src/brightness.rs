@@ -23,12 +23,13 @@ pub fn blocks((height, width): (usize, usize)) -> impl Iterator<Item = [Range<us
 
 /// Mean of each of the [`blocks`] of a frame, without pixels that are not finite.
 pub fn of_blocks(image: ArrayView2<f32>) -> Vec<f64> {
-    let mean = |[rows, columns]: [Range<usize>; 2]| {
-        let part = image.slice(s![rows, columns]);
-        let seen = || part.iter().filter(|value| value.is_finite());
-        seen().map(|value| f64::from(*value)).sum::<f64>() / seen().count().max(1) as f64
-    };
-    blocks(image.dim()).map(mean).collect()
+    blocks(image.dim()).map(|[rows, columns]| mean(image.slice(s![rows, columns]))).collect()
+}
+
+/// Without pixels that are not finite; 0 if none is.
+pub(crate) fn mean(image: ArrayView2<f32>) -> f64 {
+    let seen = || image.iter().filter(|value| value.is_finite());
+    seen().map(|value| f64::from(*value)).sum::<f64>() / seen().count().max(1) as f64
 }
 
 /// Brightness of each frame, from its blocks ([`of_blocks`]), relative to the usual one of the `members`; 1 where its blocks

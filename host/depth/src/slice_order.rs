@@ -34,12 +34,11 @@ const AT_END: f64 = 0.1;
 /// not seen, and empty for slices that are too small or dark. See [`comparable`].
 pub fn sharpness(image: ArrayView2<f32>) -> Vec<f64> {
     let seen = |part: ArrayView2<f32>| part.iter().filter(|value| value.is_finite()).count();
-    let sum: f64 = image.iter().filter(|value| value.is_finite()).map(|value| f64::from(*value)).sum();
-    let mean = sum / seen(image) as f64;
+    let mean = brightness::mean(image);
     let parts: Vec<_> =
         brightness::blocks(image.dim()).map(|[rows, columns]| image.slice(s![rows, columns])).collect();
     let is_small = |part: &ArrayView2<f32>| part.nrows().min(part.ncols()) < SMALLEST_PX;
-    if mean.is_nan() || mean <= 0.0 || parts.iter().any(is_small) {
+    if mean <= 0.0 || parts.iter().any(is_small) {
         return Vec::new();
     }
     let measured = |part: ArrayView2<f32>| match 2 * seen(part) < part.len() {

@@ -267,6 +267,21 @@ test("a field without a number is reported by name, and distances may have decim
   assert.deepEqual(page.complaints, []);
 });
 
+test("a page is loaded again when its server was restarted, because its job numbers mean other jobs", async () => {
+  const first = await serve();
+  let second = null;
+  const page = await open(browser, first.address);
+  try {
+    await page.evaluate(() => { globalThis.before = true; });
+    await first.close();
+    second = await serve(undefined, 0, Number(new URL(first.address).port));
+    await page.waitForFunction(() => !globalThis.before && document.querySelector("#link[data-phase=ready]"));
+  } finally {
+    await page.context().close();
+    await second?.close();
+  }
+});
+
 test("a picture of a new pair that comes after its files does not undo the choice of a layer", async () => {
   const page = await open(browser, server.address);
   const late = [];

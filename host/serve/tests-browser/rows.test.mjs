@@ -467,21 +467,6 @@ test("twelve jobs of a lab session, from the page alone: no dead end, and no sil
   await page.context().close();
 });
 
-test("a page is loaded again when its server was restarted, because its job numbers mean other jobs", async () => {
-  const first = await serve();
-  let second = null;
-  const page = await open(browser, first.address);
-  try {
-    await page.evaluate(() => { globalThis.before = true; });
-    await first.close();
-    second = await serve(undefined, 0, Number(new URL(first.address).port));
-    await page.waitForFunction(() => !globalThis.before && document.querySelector("#link[data-phase=ready]"));
-  } finally {
-    await page.context().close();
-    await second?.close();
-  }
-});
-
 test("an emulated rig that has ended is restarted, also with another scene, and the live image continues", async () => {
   const own = await serve();
   try {

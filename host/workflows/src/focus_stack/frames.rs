@@ -173,14 +173,20 @@ where
         return Ok(Frames::unchecked(count));
     }
     let mut comparison = Comparison { images, chosen: (0..count).collect(), model, context };
-    let neighbours = comparison.neighbours()?;
+    let mut neighbours = comparison.neighbours()?;
     let Some(composed) = slice_order::composed(&neighbours.sharpness) else {
         return comparison.judged(neighbours, positions);
     };
-    comparison.chosen.remove(composed);
     let mut positions = positions.to_vec();
     positions.remove(composed);
-    let mut frames = comparison.judged(comparison.neighbours()?, &positions)?;
+    comparison.chosen.remove(composed);
+    neighbours.sharpness.remove(composed);
+    neighbours.brightness.remove(composed);
+    neighbours.links.remove(composed.min(count - 2));
+    if (1..count - 1).contains(&composed) {
+        neighbours.links[composed - 1] = comparison.link(composed - 1, composed)?;
+    }
+    let mut frames = comparison.judged(neighbours, &positions)?;
     frames.insert_composed(composed);
     Ok(frames)
 }

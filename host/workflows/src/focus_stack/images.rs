@@ -157,8 +157,9 @@ impl<'a> Images<'a> {
             ));
         }
         if black > 0 {
+            let images = if black == 1 { "1 image has".into() } else { format!("{black} images have") };
             warnings.push(format!(
-                "{black} images have a border of zeros, which counts as not seen: the map has holes there"
+                "{images} a border of zeros, which counts as not seen: the map may have holes there"
             ));
         }
         read.white_level = white.get(request.white_level.is_some()).unwrap_or(1.0);

@@ -87,7 +87,30 @@ fn wait(due: Instant, context: &Context<'_>) -> Result<()> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Mutex;
+
     use super::*;
+    use crate::context::Progress;
+
+    #[derive(Default)]
+    struct Counted(Mutex<Vec<(usize, Option<usize>)>>);
+
+    impl Progress for Counted {
+        fn info(&self, _: &str) {}
+        fn advance(&self, _: &'static str, done: usize, total: Option<usize>) {
+            self.0.lock().unwrap().push((done, total));
+        }
+    }
+
+    #[test]
+    fn the_seconds_of_a_wait_are_counted() {
+        let counted = Counted::default();
+        let context = Context { progress: &counted, ..Context::unattended() };
+        wait(Instant::now() + Duration::from_millis(1100), &context).unwrap();
+        let mut seen = counted.0.into_inner().unwrap();
+        seen.dedup();
+        assert_eq!(seen, [(0, Some(2)), (1, Some(2))]);
+    }
 
     #[test]
     fn a_pair_waits_until_it_is_due_and_a_stop_ends_the_wait() {

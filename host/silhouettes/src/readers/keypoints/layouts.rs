@@ -110,32 +110,10 @@ const OPENPOSE_18: [&str; 18] = [
     "right ear",
     "left ear",
 ];
-const COCO_23: [&str; 23] = [
-    "nose",
-    "left eye",
-    "right eye",
-    "left ear",
-    "right ear",
-    "ls",
-    "rs",
-    "le",
-    "re",
-    "lw",
-    "rw",
-    "lh",
-    "rh",
-    "lk",
-    "rk",
-    "la",
-    "ra",
-    "left big toe",
-    "left small toe",
-    "left heel",
-    "right big toe",
-    "right small toe",
-    "right heel",
-];
-const BODY_25: [&str; 25] = [
+const FEET: [&str; 6] =
+    ["left big toe", "left small toe", "left heel", "right big toe", "right small toe", "right heel"];
+const COCO_23: [&str; 23] = joined(&[&COCO_17, &FEET]);
+const BODY_25_WITHOUT_FEET: [&str; 19] = [
     "nose",
     "neck",
     "rs",
@@ -155,58 +133,10 @@ const BODY_25: [&str; 25] = [
     "left eye",
     "right ear",
     "left ear",
-    "left big toe",
-    "left small toe",
-    "left heel",
-    "right big toe",
-    "right small toe",
-    "right heel",
 ];
-const BODY_25B_POINTS: [&str; 25] = [
-    "nose",
-    "left eye",
-    "right eye",
-    "left ear",
-    "right ear",
-    "ls",
-    "rs",
-    "le",
-    "re",
-    "lw",
-    "rw",
-    "lh",
-    "rh",
-    "lk",
-    "rk",
-    "la",
-    "ra",
-    "neck",
-    "head top",
-    "left big toe",
-    "left small toe",
-    "left heel",
-    "right big toe",
-    "right small toe",
-    "right heel",
-];
-const HALPE_26: [&str; 26] = [
-    "nose",
-    "left eye",
-    "right eye",
-    "left ear",
-    "right ear",
-    "ls",
-    "rs",
-    "le",
-    "re",
-    "lw",
-    "rw",
-    "lh",
-    "rh",
-    "lk",
-    "rk",
-    "la",
-    "ra",
+const BODY_25: [&str; 25] = joined(&[&BODY_25_WITHOUT_FEET, &FEET]);
+const BODY_25B_POINTS: [&str; 25] = joined(&[&COCO_17, &["neck", "head top"], &FEET]);
+const HALPE_TRUNK_AND_FEET: [&str; 9] = [
     "head top",
     "neck",
     "hip centre",
@@ -217,6 +147,7 @@ const HALPE_26: [&str; 26] = [
     "left heel",
     "right heel",
 ];
+const HALPE_26: [&str; 26] = joined(&[&COCO_17, &HALPE_TRUNK_AND_FEET]);
 const MEDIAPIPE_33: [&str; 33] = [
     "nose",
     "",
@@ -284,6 +215,22 @@ pub const NAMES: [&str; 28] = [
     "left small toe",
     "right small toe",
 ];
+
+const fn joined<const COUNT: usize>(parts: &[&[&'static str]]) -> [&'static str; COUNT] {
+    let mut points = [""; COUNT];
+    let (mut at, mut part) = (0, 0);
+    while part < parts.len() {
+        let mut of_part = 0;
+        while of_part < parts[part].len() {
+            points[at] = parts[part][of_part];
+            at += 1;
+            of_part += 1;
+        }
+        part += 1;
+    }
+    assert!(at == COUNT);
+    points
+}
 
 impl Layout {
     pub fn of(count: usize) -> Option<&'static Self> {
