@@ -434,7 +434,7 @@ def focus_stack(
     Parameters
     ----------
     images : sequence of array (height, width)
-        At least three grey images of one size and one kind, in the order of their focus. NaN and borders of zeros count as not
+        At least three grey images of one size and one kind, in the order of their focus. NaN and black borders count as not
         seen.
     focused_at_mm : sequence of float, optional
         Object distance in mm at which each image is sharp, ascending or descending.

@@ -121,7 +121,7 @@ fn unit_of(in_mm: bool) -> &'static str {
 /// Parameters
 /// ----------
 /// images : sequence of array (height, width)
-///     At least three grey images of one size and one kind, in the order of their focus. NaN and borders of zeros count as not
+///     At least three grey images of one size and one kind, in the order of their focus. NaN and black borders count as not
 ///     seen.
 /// focused_at_mm : sequence of float, optional
 ///     Object distance in mm at which each image is sharp, ascending or descending.

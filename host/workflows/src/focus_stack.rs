@@ -312,6 +312,7 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
         frames.warps.remove(*index);
         frames.gains.remove(*index);
     }
+    warnings.extend(images.bordered());
     if !is_even(&frames.gains) {
         let [least, most] = [f64::min, f64::max].map(|of| frames.gains.iter().copied().fold(1.0, of));
         context.info(&format!(

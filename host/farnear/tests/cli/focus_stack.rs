@@ -163,12 +163,19 @@ fn a_result_is_replaced_by_its_kind_only() {
 fn a_foreign_frame_is_named_and_left_out() {
     let folder = Folder::new();
     let (path, out) = (stack(&folder), folder.text("out"));
-    let other =
+    let mut other =
         Array2::from_shape_fn((60, 80), |(y, x)| ((x * 104_729 + y * 7919 + x * x * 17) % 199) as u16);
+    other.slice_mut(s![.., ..6]).fill(3);
     fs::write(format!("{path}/6.png"), image_file::encode_png(other.view(), 8).expect("a picture"))
         .expect("a file");
     let found = figures(&mut farnear(&["focus-stack", &path, "--out", &out, "--json"]));
     assert_eq!((number(&found, "images"), found["left_out"][0].as_str()), (8.0, Some("6.png")));
+    let bordered =
+        |figures: &serde_json::Value| figures["warnings"].to_string().contains("1 image has a black border");
+    assert!(!bordered(&found), "{found}");
+    let all = folder.text("all");
+    let all = figures(&mut farnear(&["focus-stack", &path, "--use-all", "--out", &all, "--json"]));
+    assert!(bordered(&all), "{all}");
     for (half, expected) in halves(&read(&out)).iter().zip(SHARPEST) {
         assert!((half - expected - 1.0).abs() < 0.15, "{half}");
     }

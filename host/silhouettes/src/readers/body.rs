@@ -65,29 +65,36 @@ fn inside(frame: &[Option<Point3>]) -> bool {
     })
 }
 
-/// The unit, or the best fitting of mm, cm and m if the size is not human. Keeps the caller's unit.
+/// The unit, or the best fitting of mm, cm and m if the size is not human; a remark if none fits better. Keeps the caller's unit.
 /// Measures the points `body`.
-pub fn plausible(unit: Known<Unit>, frames: &[Vec<Option<Point3>>], body: &[usize]) -> Known<Unit> {
+pub fn plausible(
+    unit: Known<Unit>,
+    frames: &[Vec<Option<Point3>>],
+    body: &[usize],
+) -> (Known<Unit>, Option<String>) {
     let limits = match unit.source {
         Source::Format => USUAL_MM,
         Source::File => POSSIBLE_MM,
-        Source::Caller | Source::Unknown { .. } | Source::Guess { .. } => return unit,
+        Source::Caller | Source::Unknown { .. } | Source::Guess { .. } => return (unit, None),
     };
-    let Some(extent) = median_extent(frames, body) else { return unit };
+    let Some(extent) = median_extent(frames, body) else { return (unit, None) };
     let stated_mm = extent * unit.value.mm;
-    if (limits[0]..=limits[1]).contains(&stated_mm) {
-        return unit;
-    }
+    let is_within = |[low, high]: [f64; 2]| (low..=high).contains(&stated_mm);
     let off = |mm: f64| (extent * mm / ADULT_MM).ln().abs();
-    let Some(best) = [1.0, 10.0, 1000.0].into_iter().min_by(|a, b| off(*a).total_cmp(&off(*b))) else {
-        return unit;
-    };
-    if off(best) > 1.5 || (best - unit.value.mm).abs() < 1e-9 {
-        return unit;
-    }
+    let best = [1.0, 10.0, 1000.0].into_iter().min_by(|a, b| off(*a).total_cmp(&off(*b)));
+    let other = best.filter(|mm| off(*mm) <= 1.5 && (mm - unit.value.mm).abs() >= 1e-9);
     let stated = if unit.source == Source::File { " as the file states" } else { "" };
     let reason = format!("in {}{stated} the body would be {stated_mm:.3} mm long", unit.value);
-    Known { value: Unit { mm: best }, source: Source::Guess { reason, sure: off(best) < 0.7 } }
+    match other.filter(|_| !is_within(limits)) {
+        Some(mm) => {
+            let source = Source::Guess { reason, sure: off(mm) < 0.7 };
+            (Known { value: Unit { mm }, source }, None)
+        }
+        None if body.len() >= POINTS && !is_within(USUAL_MM) => {
+            (unit, Some(format!("{reason}: the unit is doubtful (--units)")))
+        }
+        None => (unit, None),
+    }
 }
 
 /// Median over frames of the largest extent, file units; `None` if no frame has enough points.
@@ -172,6 +179,31 @@ mod tests {
         assert!(found.remarks()[0].contains("1.600 mm long"), "{:?}", found.remarks());
         let named = Choices { unit: Some(super::Unit { mm: 10.0 }), ..Choices::default() };
         assert_eq!(read(csv(&[row]).as_bytes(), "csv", named).expect("a table").unit.value.mm, 10.0);
+    }
+
+    #[test]
+    fn a_body_too_small_for_the_unit_that_the_file_states_is_reported() {
+        let names = ["LFHD", "C7", "LASI", "LTOE"];
+        let header = names.join("\t\t\t");
+        let text = |scale: f64| {
+            let row = [1.7, 1.5, 1.0, 0.1].map(|y| format!("0.1\t{}\t0.1", scale * y)).join("\t");
+            format!(
+                "PathFileType\t4\nDataRate\tNumMarkers\tUnits\n100\t4\tm\nFrame#\tTime\t{header}\n\n\n1\t0\t{row}\n"
+            )
+        };
+        let remarks = |scale: f64| {
+            let found = read(text(scale).as_bytes(), "trc", Choices::default()).expect("a recording");
+            assert_eq!(found.unit.value.mm, 1000.0);
+            found.remarks().join("; ")
+        };
+        let small = remarks(0.2);
+        assert!(
+            small.contains(
+                "in metres as the file states the body would be 320.000 mm long: the unit is doubtful"
+            ),
+            "{small}"
+        );
+        assert!(!remarks(1.0).contains("unit"), "{}", remarks(1.0));
     }
 
     #[test]

@@ -1,6 +1,8 @@
 //! CSV markers: header `frame,NAME_x,NAME_y,NAME_z,...` (or `NAME:x`, `NAME.X`), a frame per row, mm, empty = hidden; with
-//! `NAMEX,NAMEY,NAMEZ` as the Kinect SDK names joints (metres, y up); or with names above the axes, as Vicon Nexus and
-//! OptiTrack Motive export them.
+//! `NAMEX,NAMEY,NAMEZ` as the Kinect SDK names joints (metres, y up); with names above the axes, as Vicon Nexus and OptiTrack
+//! Motive export them; or with a row for each point.
+
+mod long;
 
 use std::collections::HashSet;
 
@@ -17,7 +19,7 @@ use crate::silhouette::capsule::Point3;
 pub const READER: Reader = Reader {
     name: "CSV",
     extensions: &["csv"],
-    about: "a table with columns NAME_x, NAME_y, NAME_z in millimetres, z up, or of the Kinect SDK, Vicon Nexus or OptiTrack Motive; keypoints with NAME_x and NAME_y, or of SLEAP, DeepLabCut or MocapNET",
+    about: "a table with columns NAME_x, NAME_y, NAME_z in millimetres, z up, or of the Kinect SDK, Vicon Nexus or OptiTrack Motive; keypoints with NAME_x and NAME_y, with a row for each, or of SLEAP, DeepLabCut or MocapNET",
     read,
 };
 
@@ -48,7 +50,7 @@ pub fn read(bytes: &[u8], choices: Choices) -> Result<Found, RecordingError> {
         .records()
         .collect::<Result<_, _>>()
         .map_err(|error| RecordingError::Kind { kind: "CSV", reason: error.to_string() })?;
-    let rows = joined(rows);
+    let rows = long::wide(joined(rows))?;
     let (columns, below) = rows
         .split_first()
         .ok_or_else(|| RecordingError::Kind { kind: "CSV", reason: "it is empty".into() })?;
@@ -97,7 +99,7 @@ fn plain(columns: &StringRecord, rows: &[StringRecord]) -> Result<Found, Recordi
         let shown: Vec<&str> = columns.iter().take(SHOWN).collect();
         let reason = format!(
             "its header names no marker ({}): expected NAME_x,NAME_y,NAME_z, or the x1,y1,v1 of numbered keypoints, as many as a \
-             layout has",
+             layout has, or a row for each point (frame,keypoint,x,y)",
             shown.join(",")
         );
         return Err(RecordingError::Kind { kind: "CSV", reason });
@@ -172,7 +174,9 @@ fn rate_hz(columns: &StringRecord, rows: &[StringRecord]) -> Option<f64> {
     let is_time = |column: &str| TIMES.iter().any(|known| column.eq_ignore_ascii_case(known));
     let column = columns.iter().position(is_time)?;
     let times: Vec<f64> = rows.iter().filter_map(|row| number(row.get(column)?)).collect();
-    let mut steps: Vec<f64> = times.windows(2).map(|two| two[1] - two[0]).collect();
+    // People of one frame have the same time.
+    let steps = times.windows(2).map(|two| two[1] - two[0]);
+    let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
     steps.sort_unstable_by(f64::total_cmp);
     let step = steps.get(steps.len() / 2).copied()?;
     let rate_hz = if step > MOST_SECONDS { 1000.0 / step } else { 1.0 / step };

@@ -22,7 +22,7 @@ use crate::silhouette::capsule::Point3;
 use aspect::Aspect;
 use document::Document;
 use layouts::NAMES;
-use people::distance;
+use people::{People, distance};
 use points::LEAST_CONFIDENCE;
 
 pub const READER: Reader = Reader {
@@ -129,7 +129,12 @@ fn found(document: Document, choices: Choices, about: Option<String>) -> Result<
     } else {
         remarks.extend(choices.aspect.filter(|_| !has_depth).map(Aspect::ignored));
     }
-    let (tracks, others) = people::followed(&frames);
+    let People { tracks, others, places } = people::followed(&frames);
+    if places > 0 {
+        remarks.push(format!(
+            "no frame shows two people, and the one shown leaps between {places} places: all are taken as one person"
+        ));
+    }
     if tracks.len() > 1 {
         let left_out =
             if others > 0 { format!("; {others} who are seen less are left out") } else { String::new() };
@@ -194,9 +199,7 @@ fn unit(frames: &[Vec<Option<Point3>>]) -> Known<Unit> {
         }
         None => (5.0, "for neither trunk nor legs are seen".into(), false),
     };
-    // More than six digits are not known.
-    let mm = format!("{mm:.5e}").parse().unwrap_or(mm);
-    Known { value: Unit { mm }, source: Source::Guess { reason, sure } }
+    Known { value: Unit::rounded(mm), source: Source::Guess { reason, sure } }
 }
 
 #[cfg(test)]

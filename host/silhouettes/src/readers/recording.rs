@@ -25,6 +25,11 @@ impl Unit {
 
     pub const MM: Self = Self { mm: 1.0 };
 
+    /// Of a guess by the size of a body, of which more than six digits are not known.
+    pub(super) fn rounded(mm: f64) -> Self {
+        Self { mm: format!("{mm:.5e}").parse().unwrap_or(mm) }
+    }
+
     pub fn named(name: &str) -> Result<Self, RecordingError> {
         let edge = |c: char| c.is_whitespace() || matches!(c, '\0' | '[' | ']' | '(' | ')' | '.');
         let name = name.trim_matches(edge).to_ascii_lowercase();
@@ -233,14 +238,14 @@ impl Found {
         remarks.extend(choices.aspect.filter(|_| !self.planar).map(Aspect::ignored));
         let anatomy = Anatomy::of(&names);
         body::add_neck(&mut names, &anatomy.aliases, &mut frames);
-        let unit = body::plausible(self.unit.unless(choices.unit), &frames, &anatomy.body);
+        let (unit, doubtful) = body::plausible(self.unit.unless(choices.unit), &frames, &anatomy.body);
         let (up, inverted) = posture::checked(self.up.unless(choices.up), &frames, &anatomy, self.planar);
         let lying = posture::lying(up.value, &frames, &anatomy, self.planar);
         for point in frames.iter_mut().flatten() {
             let settled = point.map(|p| up.value.to_z(p.map(|v| unit.value.mm * v)));
             *point = settled.filter(|p| p.iter().all(|v| v.is_finite()));
         }
-        remarks.extend(anatomy.remark.into_iter().chain(inverted).chain(lying));
+        remarks.extend(doubtful.into_iter().chain(anatomy.remark).chain(inverted).chain(lying));
         Recording {
             names,
             rate_hz: self.rate_hz,

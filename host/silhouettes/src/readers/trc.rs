@@ -61,8 +61,14 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         .filter(|(_, group)| !group[0].is_empty())
         .map(|(place, group)| (place, group[0].to_owned()))
         .collect();
-    // Some programs write other numbers of tabs between the names.
-    let packed = cells.iter().enumerate().any(|(at, cell)| at % 3 != 0 && !cell.is_empty());
+    // Some programs write other numbers of tabs between the names. With whole columns between them, two may be a marker and a
+    // virtual one.
+    let apart = all.get(1).map_or(1, |(place, _)| *place);
+    let are_spread = apart > 1
+        && all.len() > 2
+        && all.len() as f64 == count
+        && (0..).step_by(apart).zip(&all).all(|(at, (place, _))| at == *place);
+    let packed = are_spread || cells.iter().enumerate().any(|(at, cell)| at % 3 != 0 && !cell.is_empty());
     let (mut places, mut names): (Vec<usize>, Vec<String>) = if packed {
         cells.iter().filter(|name| !name.is_empty()).map(|name| (*name).to_owned()).enumerate().unzip()
     } else {

@@ -1,8 +1,11 @@
 //! Other names of the points of built-in templates, which programs name after the joint, the segment that
 //! begins there or the side. Conventions clash (`LeftShoulder` is the collar bone or the shoulder joint), so
-//! the one that explains most of a recording's names is used for all.
+//! the one that explains most of a recording's names is used for all, but for arms or legs that another one
+//! explains better.
 
 mod namings;
+
+use std::collections::BTreeMap;
 
 use super::template::Template;
 use namings::{NAMINGS, Naming};
@@ -11,6 +14,10 @@ use namings::{NAMINGS, Naming};
 const PREFIXES: [&str; 7] = ["mixamorig", "bip001", "bip01", "skeleton", "jbipc", "jbip", "ccbase"];
 /// Text after them: of OpenCap.
 const SUFFIXES: [&str; 1] = ["study"];
+/// Fewer names are not those of a body.
+const LEAST: usize = 6;
+/// Words in the names of the parts of arms and of legs.
+const LIMBS: [&[&str]; 2] = [&["arm", "hand"], &["thigh", "leg", "foot"]];
 
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Aliases {
@@ -19,16 +26,20 @@ pub struct Aliases {
     pub remark: String,
 }
 
-/// `None` if a template fits as well without aliases, or none does.
+/// Indices of names, and names in a template.
+type Matches = Vec<(usize, String)>;
+
+/// `None` if a template fits as well without aliases, or none knows enough names to tell what they lack.
 pub fn find(names: &[String]) -> Option<Aliases> {
-    let templates = || Template::names().filter_map(|name| Template::named(name).ok());
-    let fitting = templates().filter(|template| template.check(names).is_ok());
-    let known = fitting.map(|template| template.coverage(names).0).max().unwrap_or(0);
-    let simple = all_simplified(names);
-    let of = |template: &Template| -> Vec<Aliases> {
-        let table = |naming: Option<&Naming>| {
-            let found = matched(&simple, template, naming);
-            let (place, known) = found.first()?;
+    let templates: Vec<Template> = Template::names().filter_map(|name| Template::named(name).ok()).collect();
+    let covered =
+        templates.iter().map(|template| (template.check(names).is_ok(), template.coverage(names).0));
+    let covered: Vec<(bool, usize)> = covered.collect();
+    // Whether they fit, and how many names one naming knows.
+    let mut all: Vec<(bool, usize, Aliases)> = Vec::new();
+    for template in &templates {
+        for Candidate { naming, own, names: found } in candidates(names, template) {
+            let Some((place, known)) = found.first() else { continue };
             let about = naming.map_or("other spelling", |naming| naming.about);
             let remark = format!(
                 "{} of {} names are matched by alias ({about}): `{}` is `{known}` of the template `{}`",
@@ -37,23 +48,24 @@ pub fn find(names: &[String]) -> Option<Aliases> {
                 names[*place],
                 template.name
             );
-            let all: Vec<String> = found.iter().map(|(_, name)| name.clone()).collect();
-            template.check(&all).ok()?;
-            Some(Aliases { names: found, remark })
-        };
-        let namings = NAMINGS.iter().filter(|naming| naming.template == template.name);
-        std::iter::once(None).chain(namings.map(Some)).filter_map(table).collect()
-    };
+            let theirs: Vec<String> = found.iter().map(|(_, name)| name.clone()).collect();
+            all.push((template.check(&theirs).is_ok(), own, Aliases { names: found, remark }));
+        }
+    }
     // The first of equals.
-    let all: Vec<Aliases> = templates().flat_map(|template| of(&template)).collect();
-    let best = all.into_iter().rev().max_by_key(|aliases| aliases.names.len());
-    best.filter(|aliases| aliases.names.len() > known)
+    let best = |fits: bool| {
+        let known =
+            covered.iter().filter(|(own, _)| *own || !fits).map(|(_, known)| *known).max().unwrap_or(0);
+        let of = all.iter().rev().filter(|(own, _, _)| *own == fits);
+        of.max_by_key(|(_, own, _)| *own).filter(|(_, own, _)| *own > known).map(|(_, _, aliases)| aliases)
+    };
+    let is_fitting = covered.iter().any(|(fits, _)| *fits);
+    let part = || best(false).filter(|aliases| !is_fitting && aliases.names.len() >= LEAST);
+    best(true).or_else(part).cloned()
 }
 
 /// Matches names to the template `keypoints` only; empty if it does not fit, unless four in five names of a part of a body do.
-pub fn keypoints(names: &[String]) -> Vec<(usize, String)> {
-    /// Fewer names are not those of a body.
-    const LEAST: usize = 6;
+pub fn keypoints(names: &[String]) -> Matches {
     let Ok(template) = Template::named("keypoints") else { return Vec::new() };
     let best = known_keypoints(names, &template);
     let known: Vec<String> = best.iter().map(|(_, name)| name.clone()).collect();
@@ -68,16 +80,64 @@ pub fn are_of_another_body(names: &[String]) -> bool {
     Template::named("keypoints").is_ok_and(|template| known_keypoints(names, &template).len() >= 3)
 }
 
-fn known_keypoints(names: &[String], template: &Template) -> Vec<(usize, String)> {
-    let simple = all_simplified(names);
-    let namings = NAMINGS.iter().filter(|naming| naming.template == template.name);
-    let all = namings.map(|naming| matched(&simple, template, Some(naming)));
-    all.rev().max_by_key(Vec::len).unwrap_or_default()
+fn known_keypoints(names: &[String], template: &Template) -> Matches {
+    let all = candidates(names, template).into_iter().rev();
+    all.max_by_key(|candidate| candidate.own).map(|candidate| candidate.names).unwrap_or_default()
+}
+
+struct Candidate {
+    naming: Option<&'static Naming>,
+    /// Names that this naming knows.
+    own: usize,
+    /// With limbs of others.
+    names: Matches,
+}
+
+/// Matches by the template's own names and by each naming, in each spelling.
+fn candidates(names: &[String], template: &Template) -> Vec<Candidate> {
+    let of_template = NAMINGS.iter().filter(|naming| naming.template == template.name);
+    let namings: Vec<Option<&Naming>> = std::iter::once(None).chain(of_template.map(Some)).collect();
+    let mut all = Vec::new();
+    for simple in spellings(names) {
+        let tables: Vec<Matches> = namings.iter().map(|naming| matched(&simple, template, *naming)).collect();
+        all.extend(namings.iter().zip(&tables).map(|(naming, own)| Candidate {
+            naming: *naming,
+            own: own.len(),
+            names: with_limbs(own, &tables, template),
+        }));
+    }
+    all
+}
+
+/// Takes arms or legs from the naming that knows all of their points that this one knows, and more: some rigs name arms as one
+/// program does and legs as another.
+fn with_limbs(own: &[(usize, String)], tables: &[Matches], template: &Template) -> Matches {
+    let mut found = own.to_vec();
+    for words in LIMBS {
+        let parts = template.parts.iter().filter(|part| words.iter().any(|word| part.name.contains(word)));
+        let markers: Vec<&String> = parts.flat_map(|part| &part.markers).collect();
+        let split = |all: &Matches| -> (Matches, Matches) {
+            all.iter().cloned().partition(|(_, name)| markers.contains(&name))
+        };
+        let (limb, rest) = split(&found);
+        let others = tables.iter().map(|table| split(table).0).filter(|other| {
+            let is_free = |place: &usize| rest.iter().all(|(taken, _)| taken != place);
+            let has = |name: &String| other.iter().any(|(_, known)| known == name);
+            other.len() > limb.len()
+                && limb.iter().all(|(_, name)| has(name))
+                && other.iter().all(|(place, _)| is_free(place))
+        });
+        if let Some(other) = others.reduce(|best, other| if other.len() > best.len() { other } else { best })
+        {
+            found = [rest, other].concat();
+        }
+    }
+    found
 }
 
 /// Each point of the template once, with the first matching name.
-fn matched(simple: &[String], template: &Template, naming: Option<&Naming>) -> Vec<(usize, String)> {
-    let mut found: Vec<(usize, String)> = Vec::new();
+fn matched(simple: &[String], template: &Template, naming: Option<&Naming>) -> Matches {
+    let mut found: Matches = Vec::new();
     let markers: Vec<&String> = template.parts.iter().flat_map(|part| &part.markers).collect();
     let mut add = |place: usize, name: &str| {
         if markers.iter().any(|marker| *marker == name)
@@ -113,18 +173,27 @@ fn matched(simple: &[String], template: &Template, naming: Option<&Naming>) -> V
     found
 }
 
-/// Names simplified, without the text up to `_` that all begin with, such as a rig's.
-fn all_simplified(names: &[String]) -> Vec<String> {
-    let first = names.first().filter(|_| names.len() > 1).map_or("", |name| without_subject(name));
-    let ends = first.match_indices('_').map(|(at, _)| at + 1);
-    let is_shared = |end: &usize| names.iter().all(|name| without_subject(name).starts_with(&first[..*end]));
-    let shared = simplified(&first[..ends.take_while(is_shared).last().unwrap_or(0)]);
-    let is_side = ["left", "right", "l", "r"].contains(&shared.as_str());
-    let own = |name: &String| {
-        let simple = simplified(name);
-        simple.strip_prefix(&shared).filter(|_| !is_side).unwrap_or(&simple).to_owned()
-    };
-    names.iter().map(own).collect()
+/// Names simplified as they are, and without the text up to `_` that most of them begin with: that of a rig, which helper joints lack.
+fn spellings(names: &[String]) -> Vec<Vec<String>> {
+    /// Texts of a name that are counted.
+    const MOST: usize = 4;
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for own in names.iter().map(|name| without_subject(name)) {
+        for (at, _) in own.match_indices('_').take(MOST) {
+            *counts.entry(&own[..=at]).or_default() += 1;
+        }
+    }
+    let is_side = |text: &str| ["left", "right", "l", "r"].contains(&simplified(text).as_str());
+    let shared = counts.into_iter().filter(|(text, count)| *count > 1 && !is_side(text));
+    let shared = shared.max_by_key(|(text, count)| (*count, text.len()));
+    let simple: Vec<String> = names.iter().map(|name| simplified(name)).collect();
+    let without: Option<Vec<String>> = shared.map(|(text, _)| {
+        let own = |(name, simple): (&String, &String)| {
+            without_subject(name).strip_prefix(text).map_or_else(|| simple.clone(), simplified)
+        };
+        names.iter().zip(&simple).map(own).collect()
+    });
+    std::iter::once(simple).chain(without).collect()
 }
 
 fn without_subject(name: &str) -> &str {
@@ -308,6 +377,54 @@ mod tests {
             assert_eq!(found, template, "{names}");
             assert!(matched >= count, "{matched} of {count}: {names}");
         }
+    }
+
+    #[test]
+    fn helper_joints_without_the_prefix_of_a_rig_do_not_hide_it() {
+        let bones = "Hips Spine Spine1 LeftArm LeftForeArm LeftHand RightArm RightForeArm RightHand Neck Head LeftUpLeg LeftLeg \
+                     LeftFoot LeftToeBase RightUpLeg RightLeg RightFoot RightToeBase";
+        let rig: Vec<String> = bones.split_whitespace().map(|bone| format!("Character1_{bone}")).collect();
+        let helpers = "L_Radius_MESH L_Radius_MESH_End L_Tibia_MESH R_Radius_MESH R_Radius_MESH_End R_Tibia_MESH Neck_MESH";
+        assert_eq!(template_of(&format!("{} {helpers}", rig.join(" "))), ("bvh".into(), 19));
+    }
+
+    #[test]
+    fn arms_and_legs_may_be_named_by_two_conventions() {
+        let names = "hip Chest Chest2 Neck neck1 Head jaw RightCollar RightShoulder RightElbow RightWrist LeftCollar LeftShoulder \
+                     LeftElbow LeftWrist rButtock rThigh rShin rFoot lButtock lThigh lShin lFoot";
+        let names: Vec<String> = names.split_whitespace().map(str::to_owned).collect();
+        let found = find(&names).expect("a template").names;
+        for (name, known) in [
+            ("LeftShoulder", "LeftArm"),
+            ("RightElbow", "RightForeArm"),
+            ("LeftWrist", "LeftHand"),
+            ("rThigh", "RightUpLeg"),
+            ("lShin", "LeftLeg"),
+            ("lFoot", "LeftFoot"),
+            ("hip", "Hips"),
+        ] {
+            let of = found.iter().find(|(place, _)| names[*place] == name).map(|(_, known)| known.as_str());
+            assert_eq!(of, Some(known), "{name}");
+        }
+        let mut places: Vec<usize> = found.iter().map(|(place, _)| *place).collect();
+        places.sort_unstable();
+        places.dedup();
+        assert_eq!(places.len(), found.len());
+    }
+
+    #[test]
+    fn a_part_of_a_body_has_aliases_that_tell_what_it_lacks() {
+        let names = "V_Sacral R_ASIS L_ASIS R_Knee_Lat R_Thigh_Upper L_Knee_Lat L_Thigh_Upper R_Ankle_Lat L_Ankle_Lat R_Heel R_MTP1 \
+                     L_Heel L_MTP1 Clavicle R_Acromium L_Acromium";
+        let mut names: Vec<String> = names.split_whitespace().map(str::to_owned).collect();
+        let found = find(&names).expect("a part").names;
+        assert!(found.iter().any(|(_, known)| known == "left knee") && found.len() == 11, "{found:?}");
+        names.extend(found.into_iter().map(|(_, known)| known));
+        let error = Template::named("keypoints").expect("built in").check(&names).expect_err("no head");
+        assert!(
+            error.to_string().starts_with("only shoulders, trunk, hips, left thigh, left leg"),
+            "{error}"
+        );
     }
 
     #[test]

@@ -38,17 +38,19 @@ pub enum TemplateError {
     Name(String),
     #[error("template: part `{part}` {reason}")]
     Part { part: String, reason: String },
-    #[error("{}", lacking(.missing, *.of, .template, .present))]
+    #[error("{}", lacking(.missing, *.of, .template, .parts, .present))]
     UnknownMarkers {
-        missing: Vec<String>,
+        missing: Box<[String]>,
         of: usize,
         template: String,
+        /// Those of which the recording has more than one marker, or all.
+        parts: Box<[String]>,
         /// Some markers of the recording.
-        present: Vec<String>,
+        present: Box<[String]>,
     },
 }
 
-fn lacking(missing: &[String], of: usize, template: &str, present: &[String]) -> String {
+fn lacking(missing: &[String], of: usize, template: &str, parts: &[String], present: &[String]) -> String {
     let (names, count) = (listed(present), missing.len());
     let missing = listed(missing);
     if count == of {
@@ -56,8 +58,12 @@ fn lacking(missing: &[String], of: usize, template: &str, present: &[String]) ->
             "none of the recording's names ({names}) is one of the {of} markers of template `{template}` ({missing})"
         );
     }
+    let only = match parts {
+        [] => String::new(),
+        _ => format!("only {}: a part of a body is not drawn; ", parts.join(", ")),
+    };
     format!(
-        "the recording lacks {count} of the {of} markers of template `{template}` ({missing}); it has {names}"
+        "{only}the recording lacks {count} of the {of} markers of template `{template}` ({missing}); it has {names}"
     )
 }
 
@@ -108,21 +114,23 @@ impl Template {
         (all.iter().filter(|marker| !has(marker)).map(|m| (*m).clone()).collect(), all.len())
     }
 
-    /// Parts that can be drawn: at least two markers, or one and a thickness.
-    fn drawn(&self, missing: &[String]) -> usize {
+    /// Parts with two markers, or with all; one is enough for a part with a thickness if `any`.
+    fn drawn(&self, missing: &[String], any: bool) -> Vec<&Part> {
         let there = |part: &&Part| {
             let present = part.markers.iter().filter(|marker| !missing.contains(marker)).count();
-            present >= if part.thickness_mm > 0.0 { 1 } else { part.markers.len().min(2) }
+            present >= if any && part.thickness_mm > 0.0 { 1 } else { part.markers.len().min(2) }
         };
-        self.parts.iter().filter(there).count()
+        self.parts.iter().filter(there).collect()
     }
 
     /// Requires half of the markers, or enough for four parts in five (templates name many joints).
     pub fn check(&self, names: &[String]) -> Result<(), TemplateError> {
         let (missing, of) = self.missing(names);
-        if 2 * missing.len() > of && 5 * self.drawn(&missing) < 4 * self.parts.len() {
+        if 2 * missing.len() > of && 5 * self.drawn(&missing, true).len() < 4 * self.parts.len() {
+            let parts = self.drawn(&missing, false).into_iter().map(|part| part.name.clone()).collect();
             return Err(TemplateError::UnknownMarkers {
-                missing,
+                parts,
+                missing: missing.into(),
                 of,
                 template: self.name.clone(),
                 present: names.iter().take(12).cloned().collect(),

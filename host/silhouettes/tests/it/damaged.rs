@@ -26,6 +26,9 @@ fn kinect_file() -> String {
 
 const TRC: &str = "PathFileType\t4\t(X/Y/Z)\twalk.trc\nDataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames\n100\t100\t2\t2\tmm\t100\t1\t2\nFrame#\tTime\tA\t\t\tB\t\t\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n\n1\t0.0\t1\t2\t3\t4\t5\t6\n2\t0.01\t1\t2\t3\t4\t5\t6\n";
 const CSV: &str = "frame,HEAD_x,HEAD_y,HEAD_z,HIP_x,HIP_y,HIP_z\n0,0,0,1700,0,0,900\n1,0,0,1690,0,0,890\n";
+/// A row for each point.
+const LONG: &str = "frame,person_id,keypoint,x,y,score\n0,1,nose,10,20,0.9\n0,1,left_knee,10,80,0.9\n0,2,nose,50,20,0.9\n1,1,nose,11,20,0.9\n";
+
 fn keypoints() -> String {
     let points =
         |x: usize| (0..17).map(|n| format!("{}, {}, 0.9", x + n, 10 * n)).collect::<Vec<_>>().join(", ");
@@ -51,6 +54,7 @@ proptest! {
         let _ = kinect::read(hurt(&kinect_file()).as_bytes());
         let _ = trc::read(hurt(TRC).as_bytes());
         let _ = csv::read(hurt(CSV).as_bytes(), Choices::default());
+        let _ = csv::read(hurt(LONG).as_bytes(), Choices::default());
         let _ = Template::parse(&hurt(TEMPLATE));
         // Accepted data are also turned upright and their units guessed.
         for (text, ending) in [(TRC.to_owned(), "trc"), (CSV.to_owned(), "csv"), (ntu_file(), "skeleton"), (kinect_file(), "txt"), (keypoints(), "json")] {

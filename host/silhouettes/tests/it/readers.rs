@@ -151,6 +151,15 @@ fn unknown_markers_are_named() {
         .check(&["A".into(), "B".into()])
         .expect_err("no such suit");
     assert!(error.to_string().contains("LFHD") && error.to_string().contains("plug-in-gait"), "{error}");
+    let legs = "LASI RASI LTHI RTHI LKNE RKNE LTIB RTIB LANK RANK LTOE RTOE".split(' ').map(str::to_owned);
+    let error = Template::named("plug-in-gait").expect("built in").check(&legs.collect::<Vec<_>>());
+    let error = error.expect_err("legs").to_string();
+    assert!(
+        error.starts_with(
+            "only lower torso, left thigh, right thigh, left leg and foot, right leg and foot: a part"
+        ),
+        "{error}"
+    );
     assert!(Template::parse("name = 'x'\n[[part]]\nname = 'head'\nmarkers = []\n").is_err());
 }
 
@@ -257,6 +266,17 @@ fn a_trc_file_with_other_numbers_of_tabs_between_its_names_is_read() {
         );
         assert_eq!(found.frames[1][1], Some([4.0, 5.0, 6.0]));
     }
+}
+
+#[test]
+fn a_trc_file_with_whole_columns_between_its_names_is_read() {
+    let text = "PathFileType\t4\nDataRate\tNumMarkers\tUnits\n100\t3\tmm\nFrame#\tTime\tA\t\t\tB\t\t\tC\n\n\n1\t0\t1\t2\t3\t4\t5\t6\t7\t8\t9\n";
+    for between in ["\t".repeat(6), "\t".repeat(9)] {
+        let spread = text.replace("A\t\t\tB\t\t\tC", &["A", "B", "C"].join(&between));
+        assert_ne!(spread, text);
+        assert_eq!(trc::read(spread.as_bytes()), trc::read(text.as_bytes()));
+    }
+    assert_eq!(trc::read(text.as_bytes()).expect("a TRC file").names, ["A", "B", "C"]);
 }
 
 #[test]

@@ -24,7 +24,10 @@ use farnear_files::{
 };
 use ndarray::{Array2, ArrayView2, CowArray, Ix2};
 
-use super::{FocusStackRequest, black_border};
+use super::{
+    FocusStackRequest,
+    black_border::{self, Sides},
+};
 use crate::{
     context::Context,
     error::{About, Result, WorkflowError},
@@ -38,6 +41,8 @@ pub(super) struct Images<'a> {
     images: Vec<(u64, (usize, usize))>,
     /// Pixels of each image without a value, which have the mean of their neighbours.
     specks: Vec<Vec<(usize, usize)>>,
+    /// Whether each image has a black border.
+    bordered: Vec<bool>,
     /// Brightness of each image, which is divided by it.
     gains: Vec<f32>,
     /// Pixels are divided by it.
@@ -115,13 +120,14 @@ impl<'a> Images<'a> {
             folder: request.out.clone(),
             images: Vec::with_capacity(paths.len()),
             specks: Vec::with_capacity(paths.len()),
+            bordered: Vec::with_capacity(paths.len()),
             gains: vec![1.0; paths.len()],
             white_level: 1.0,
             code_step: 0.0,
             context,
         };
         let (mut end, mut colour, mut white) = (0, false, SharedWhiteLevel::default());
-        let (mut without_value, mut black) = (0, 0);
+        let (mut without_value, mut black) = (0, Vec::with_capacity(paths.len()));
         let settings = ReadSettings { grey: request.grey, white_level: request.white_level };
         context.cancel.check("reading the stack")?;
         stack::read(paths, &settings, |index, mut image| -> Result<()> {
@@ -137,11 +143,13 @@ impl<'a> Images<'a> {
                 warnings.push(mosaic::WORDS.into());
             }
             white.add(&image);
-            if let Samples::Integer(bits) = image.samples {
-                read.code_step = read.code_step.max(1.0 / (2_f32.powi(bits.into()) - 1.0));
-            }
+            let code_step = match image.samples {
+                Samples::Integer(bits) => 1.0 / (2_f32.powi(bits.into()) - 1.0),
+                Samples::Float => 0.0,
+            };
+            read.code_step = read.code_step.max(code_step);
             without_value += image.pixels.iter().filter(|value| !value.is_finite()).count();
-            black += usize::from(black_border::erase(&mut image.pixels));
+            black.push((black_border::sides(&mut image.pixels, code_step), code_step));
             read.specks.push(fill_specks(&mut image.pixels));
             read.images.push((end, image.pixels.dim()));
             read.write(index, image.pixels.view())?;
@@ -156,12 +164,7 @@ impl<'a> Images<'a> {
                 "{without_value} pixels of the images have no value (NaN or transparent): the map has holes there"
             ));
         }
-        if black > 0 {
-            let images = if black == 1 { "1 image has".into() } else { format!("{black} images have") };
-            warnings.push(format!(
-                "{images} a border of zeros, which counts as not seen: the map may have holes there"
-            ));
-        }
+        read.erase_black(&black)?;
         read.white_level = white.get(request.white_level.is_some()).unwrap_or(1.0);
         Ok(read)
     }
@@ -169,7 +172,35 @@ impl<'a> Images<'a> {
     pub fn remove(&mut self, index: usize) {
         self.images.remove(index);
         self.specks.remove(index);
+        self.bordered.remove(index);
         self.gains.remove(index);
+    }
+
+    /// Erases the black borders of images, from their sides and the steps of their codes.
+    fn erase_black(&mut self, black: &[(Sides, f32)]) -> Result<()> {
+        let sides: Vec<Sides> = black.iter().map(|(sides, _)| *sides).collect();
+        let erased = black_border::of_some(&sides);
+        for (index, (sides, code_step)) in black.iter().enumerate() {
+            let sides: Sides = std::array::from_fn(|side| sides[side] && erased[side]);
+            let mut bordered = false;
+            if sides.contains(&true) {
+                let mut image = self.stored(index, 0..self.dim(index).0)?;
+                bordered = black_border::erase(&mut image, *code_step, sides);
+                self.write(index, image.view())?;
+            }
+            self.bordered.push(bordered);
+        }
+        Ok(())
+    }
+
+    /// A remark on the images with a black border, if there are any.
+    pub fn bordered(&self) -> Option<String> {
+        let images = match self.bordered.iter().filter(|bordered| **bordered).count() {
+            0 => return None,
+            1 => "1 image has".into(),
+            count => format!("{count} images have"),
+        };
+        Some(format!("{images} a black border, which counts as not seen: the map may have holes there"))
     }
 
     pub fn divide_by(&mut self, gains: &[f64]) {

@@ -10,7 +10,8 @@ use farnear_depth::{
 use ndarray::{Array2, ArrayView2};
 
 use super::{
-    black_border, frames,
+    black_border::{self, Sides},
+    frames,
     images::{darkest, even, fill_specks, mark_specks},
     withhold,
 };
@@ -42,7 +43,7 @@ impl PreparedStack {
 }
 
 /// Leaves out images that show another scene, are turned or shaken, unless `use_all` is set; evens out the brightness of the
-/// others and aligns them. Pixels are NaN where an image does not show the scene, also in borders of zeros. `code_step` is that
+/// others and aligns them. Pixels are NaN where an image does not show the scene, also in black borders. `code_step` is that
 /// of integers from 0 to 1, and 0 for other images.
 pub fn prepare_stack(
     mut images: Vec<Array2<f32>>,
@@ -52,10 +53,11 @@ pub fn prepare_stack(
     use_all: bool,
     context: &Context<'_>,
 ) -> Result<PreparedStack> {
-    let mut specks = Vec::with_capacity(images.len());
+    let sides: Vec<Sides> = images.iter_mut().map(|image| black_border::sides(image, code_step)).collect();
+    let mut specks: Vec<_> = images.iter_mut().map(fill_specks).collect();
+    let erased = black_border::of_some(&sides);
     for image in &mut images {
-        black_border::erase(image);
-        specks.push(fill_specks(image));
+        black_border::erase(image, code_step, erased);
     }
     let views: Vec<ArrayView2<f32>> = images.iter().map(|image| image.view()).collect();
     let mut frames = frames::of_stack(&views[..], &positions, model, use_all, context)?;

@@ -10,6 +10,8 @@ use crate::silhouette::capsule::Point3;
 const STATURE_M: std::ops::RangeInclusive<f64> = 1.4..=2.1;
 /// Geometric mean of the range.
 const TYPICAL_M: f64 = 1.7;
+/// Beyond these statures the unit is none that is usual.
+const POSSIBLE_M: std::ops::RangeInclusive<f64> = 0.8..=2.6;
 /// Share of the feet-to-head vector along an axis for a sure up axis.
 const UPRIGHT: f64 = 0.8;
 /// Height of the hips over the length of a leg, of a person who does not lie.
@@ -94,9 +96,9 @@ fn length(joints: &[Joint], joint: usize) -> f64 {
 }
 
 pub fn unit(joints: &[Joint]) -> Known<Unit> {
-    let (size, what) = match Body::of(joints) {
-        Ok(body) => (body.stature(joints), "from head to toe along the bones".to_owned()),
-        Err(missing) => (extent(joints), format!("at its longest ({missing})")),
+    let (size, what, is_stature) = match Body::of(joints) {
+        Ok(body) => (body.stature(joints), "from head to toe along the bones".to_owned(), true),
+        Err(missing) => (extent(joints), format!("at its longest ({missing})"), false),
     };
     // A child is likelier than a giant.
     let far = |mm: f64| {
@@ -113,9 +115,14 @@ pub fn unit(joints: &[Joint]) -> Known<Unit> {
     let sure = STATURE_M.contains(&metres);
     let (low, high) = (STATURE_M.start(), STATURE_M.end());
     let person = if sure { "as a person of" } else { "not a person of" };
-    let reason = format!(
-        "for the skeleton is {size:.2} long {what}, which makes {metres:.2} m ({person} {low} to {high} m)"
-    );
+    let measured = format!("{metres:.2} m ({person} {low} to {high} m)");
+    let mm = 1000.0 * TYPICAL_M / size;
+    let (value, makes) = if is_stature && mm.is_normal() && !POSSIBLE_M.contains(&metres) {
+        (Unit::rounded(mm), format!("{TYPICAL_M} m; {value} would make {measured}"))
+    } else {
+        (value, measured)
+    };
+    let reason = format!("for the skeleton is {size:.2} long {what}, which makes {makes}");
     Known { value, source: Source::Guess { reason, sure } }
 }
 
@@ -204,6 +211,16 @@ mod tests {
         // A child of 1.13 m in inches; in the CMU library's unit it would be 2.52 m.
         let child = unit(&body(44.66 / 17.0, |p| p, STILL).joints);
         assert!(child.value.mm == 25.4 && !sure(&child), "{child:?}");
+    }
+
+    #[test]
+    fn a_skeleton_of_no_usual_unit_is_of_a_typical_height() {
+        // 10.3 m in metres, and less than a millimetre.
+        for (scale, usual) in [(10.3 / 17.0, "0.58 m (not a person"), (1e-5, "0.00 m (not a person")] {
+            let found = unit(&body(scale, |p| p, STILL).joints);
+            assert!((17.0 * scale * found.value.mm - 1700.0).abs() < 0.1 && !sure(&found), "{found:?}");
+            assert!(format!("{found:?}").contains(usual), "{found:?}");
+        }
     }
 
     #[test]

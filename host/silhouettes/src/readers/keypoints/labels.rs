@@ -14,6 +14,8 @@ use crate::{readers::recording::RecordingError, silhouette::aliases};
 const KEYS: [&str; 3] = ["name", "part", "id"];
 /// Points of COCO, the usual layout of programs that leave points out.
 const USUAL: usize = 17;
+/// Points of OpenPose's COCO layout, of which the second is the neck.
+const WITH_NECK: usize = 18;
 /// Fewer numbers are not those of a body.
 pub const LEAST: usize = 6;
 
@@ -69,15 +71,15 @@ pub fn order(frames: &mut [Vec<Person>]) -> Result<Option<String>, RecordingErro
 
 fn repeated(label: &str, frame: usize) -> RecordingError {
     RecordingError::Kind {
-        kind: "keypoint JSON",
+        kind: "keypoint",
         reason: format!(
             "frame {frame} has two points `{label}` of one person, expected each once: rename or remove one"
         ),
     }
 }
 
-/// Numbers count from 0 or 1, in the layout of as many points as they reach, or in COCO if they reach less far: that in which
-/// left and right limbs differ least.
+/// Numbers count from 0 or 1, in the layout of as many points as they reach, or if they reach less far in COCO, or in OpenPose's
+/// if there is a neck: that in which left and right limbs differ least.
 fn by_number(labels: &[String], frames: &[Vec<Person>]) -> Option<Order> {
     let ids: Vec<usize> = labels.iter().map(|label| label.parse().ok()).collect::<Option<_>>()?;
     let (least, last) = (*ids.iter().min()?, *ids.iter().max()?);
@@ -88,18 +90,24 @@ fn by_number(labels: &[String], frames: &[Vec<Person>]) -> Option<Order> {
         return None;
     }
     let reach = last.checked_add(1)?;
-    let candidates = [1_usize, 0].into_iter().filter(|first| *first == 0 || least == 1).flat_map(|first| {
-        let counts = [USUAL, reach - first].into_iter().filter(move |count| reach <= first + count);
-        counts.filter_map(Layout::of).map(move |layout| (first, layout))
-    });
-    let measured = candidates.map(|(first, layout)| {
-        let point = |person: &Person, place: usize| {
+    let point = |first: usize| {
+        move |person: &Person, place: usize| {
             let is_it = |label: &String| label.parse().is_ok_and(|id: usize| id == place + first);
             let raw = person.raw.get(person.labels.iter().position(is_it)?)?;
             raw.in_space().or_else(|| raw.in_picture())
+        }
+    };
+    let candidates = [1_usize, 0].into_iter().filter(|first| *first == 0 || least == 1).flat_map(|first| {
+        let counts = match spatial::has_neck(people(), point(first)) {
+            Some(true) => [reach - first, WITH_NECK],
+            _ => [USUAL, reach - first],
         };
+        let counts = counts.into_iter().filter(move |count| reach <= first + count);
+        counts.filter_map(Layout::of).map(move |layout| (first, layout))
+    });
+    let measured = candidates.map(|(first, layout)| {
         // Without limbs of both sides nothing favours a layout.
-        (spatial::asymmetry(people(), layout, point).unwrap_or(f64::INFINITY), first, layout)
+        (spatial::asymmetry(people(), layout, point(first)).unwrap_or(f64::INFINITY), first, layout)
     });
     let (_, first, layout) = measured.min_by(|a, b| a.0.total_cmp(&b.0))?;
     let about = format!(
@@ -141,7 +149,7 @@ fn by_place(labels: &[String], frames: &mut [Vec<Person>]) -> Result<String, Rec
     }
     let Some(person) = frames.iter().flatten().next() else {
         return Err(RecordingError::Kind {
-            kind: "keypoint JSON",
+            kind: "keypoint",
             reason: format!(
                 "too few of its named points ({names}) are those of a person: expected names such as nose, left_shoulder and \
                  right_hip, or numbers such as COCO's from 0 to 16"

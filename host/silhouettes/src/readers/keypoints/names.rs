@@ -51,12 +51,17 @@ fn step(from: &Name, to: &Name) -> Option<u128> {
 }
 
 /// Place of the first number in which names of the same texts differ. Numbers with one of these between them, as those of a
-/// time, are one.
+/// time, are one; with hyphens, those of a date or a time, which has three.
 fn counted(from: &Name, to: &Name) -> Option<usize> {
     let pairs = || from.pieces.iter().zip(&to.pieces);
     let alike = from.pieces.len() == to.pieces.len() && pairs().all(|(from, to)| from.0 == to.0);
     let place = pairs().position(|(from, to)| from.1 != to.1).filter(|_| alike)?;
-    let is_joined = |(text, _): &&(String, u128)| [".", ",", ":", "-"].contains(&text.as_str());
+    let hyphens = to.pieces.iter().filter(|(text, _)| text == "-").count();
+    let is_joined = |(text, _): &&(String, u128)| match text.as_str() {
+        "." | "," | ":" => true,
+        "-" => hyphens > 1,
+        _ => false,
+    };
     Some(place - to.pieces[1..=place].iter().rev().take_while(is_joined).count())
 }
 
@@ -125,6 +130,8 @@ mod tests {
         );
         let found = remarks(&[numbered("video1_"), numbered("video2_")].concat());
         assert!(found.contains("2 sequences, which begin with video1_0001.jpg, video2_0001.jpg:"), "{found}");
+        let found = remarks(&[numbered("take_1-"), numbered("take_2-")].concat());
+        assert!(found.contains("2 sequences, which begin with take_1-0001.jpg, take_2-0001.jpg:"), "{found}");
         let of_two_kinds: Vec<String> =
             (1..=9).flat_map(|n| [format!("a1/b{n}.jpg"), format!("cer-kratasy/{n}.jpg")]).collect();
         let found = remarks(&of_two_kinds);

@@ -25,8 +25,15 @@ struct Followed {
     seen: Vec<(usize, usize)>,
 }
 
-/// The people seen most, and the number of others.
-pub fn followed(frames: &[Vec<Person>]) -> (Vec<Track>, usize) {
+pub struct People {
+    /// Of those seen most.
+    pub tracks: Vec<Track>,
+    pub others: usize,
+    /// Places between which a single person leaps; 0 for people who were followed.
+    pub places: usize,
+}
+
+pub fn followed(frames: &[Vec<Person>]) -> People {
     let numbered = numbered(frames);
     let mut all: Vec<Followed> = Vec::new();
     // Those without a number who are not forgotten.
@@ -78,6 +85,13 @@ pub fn followed(frames: &[Vec<Person>]) -> (Vec<Track>, usize) {
             }
         }
     }
+    let mut places = 0;
+    if of_id.is_empty()
+        && let Some(alone) = alone(&all)
+    {
+        places = all.len();
+        all = vec![alone];
+    }
     all.sort_by(|a, b| b.heights.total_cmp(&a.heights));
     let longest = all.iter().map(|track| track.seen.len()).max().unwrap_or(0);
     all.retain(|track| track.seen.len() as f64 >= LEAST_SHARE * longest as f64);
@@ -93,7 +107,16 @@ pub fn followed(frames: &[Vec<Person>]) -> (Vec<Track>, usize) {
             .for_each(|points| points.resize(NAMES.len(), None));
         whole
     };
-    (all.iter().take(MOST).map(points).collect(), others)
+    People { tracks: all.iter().take(MOST).map(points).collect(), others, places }
+}
+
+/// One person of all frames, if none of them shows two and nobody stays in place for half of them: a collection of pictures.
+fn alone(all: &[Followed]) -> Option<Followed> {
+    let mut seen: Vec<(usize, usize)> = all.iter().flat_map(|track| &track.seen).copied().collect();
+    seen.sort_unstable();
+    let are_single = seen.windows(2).all(|two| two[0].0 < two[1].0);
+    let is_leaping = all.iter().all(|track| 2 * track.seen.len() < seen.len());
+    (are_single && is_leaping && !seen.is_empty()).then(|| Followed { seen, ..begun([0.0; 3], 0.0) })
 }
 
 /// Whether the file's numbers tell people apart: not if most frames of several people repeat one, as those of AlphaPose

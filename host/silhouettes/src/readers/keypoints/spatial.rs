@@ -100,27 +100,36 @@ pub fn layout<'a>(
     })
 }
 
-/// The order of points of a picture. The second of OpenPose's BODY_25 is the neck, in the middle of the shoulders.
-pub fn picture_layout<'a>(
-    people: impl Iterator<Item = &'a Person> + Clone,
-    own: &'static Layout,
-) -> &'static Layout {
+/// Whether the second point is in the middle of the third and the sixth, as the neck between the shoulders in OpenPose's
+/// layouts; `None` without them. `point` is that of a person at a place.
+pub fn has_neck<'a>(
+    people: impl Iterator<Item = &'a Person>,
+    point: impl Fn(&Person, usize) -> Option<Point3>,
+) -> Option<bool> {
     const NEAR: f64 = 0.3;
-    if own.count != BODY_25B.count {
-        return own;
-    }
-    let point = |person: &Person, place: usize| person.raw.get(place)?.in_picture();
     let (mut away, mut wide) = (0.0, 0.0);
-    for person in people.clone() {
+    for person in people {
         if let (Some(neck), Some(right), Some(left)) = (point(person, 1), point(person, 2), point(person, 5))
         {
             away += distance(neck, std::array::from_fn(|k| 0.5 * (right[k] + left[k])));
             wide += distance(right, left);
         }
     }
+    (wide > 0.0).then_some(away <= NEAR * wide)
+}
+
+/// The order of points of a picture.
+pub fn picture_layout<'a>(
+    people: impl Iterator<Item = &'a Person> + Clone,
+    own: &'static Layout,
+) -> &'static Layout {
+    if own.count != BODY_25B.count {
+        return own;
+    }
+    let point = |person: &Person, place: usize| person.raw.get(place)?.in_picture();
     let differ = |order: &Layout| asymmetry(people.clone(), order, point);
     let is_other = differ(own).zip(differ(&BODY_25B)).is_some_and(|(own, other)| other < own);
-    if away > NEAR * wide && is_other { &BODY_25B } else { own }
+    if is_other && has_neck(people, point) == Some(false) { &BODY_25B } else { own }
 }
 
 /// Mean difference of left and right limbs relative to their length, `None` without limbs of both sides; `point` is that of a

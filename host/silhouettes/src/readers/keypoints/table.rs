@@ -22,11 +22,14 @@ use crate::{
     silhouette::{aliases, anatomy},
 };
 
-const CONFIDENCES: [&str; 5] = ["likelihood", "score", "confidence", "conf", "visibility"];
+pub(in crate::readers) const CONFIDENCES: [&str; 5] =
+    ["likelihood", "score", "confidence", "conf", "visibility"];
 /// MocapNET writes x, y and the visibility before the name.
 const MOCAPNET: [&str; 3] = ["2DX_", "2DY_", "visible_"];
-const FRAMES: [&str; 6] = ["frame_idx", "frameNumber", "frame", "frame_number", "frame_id", "frame_index"];
-const PEOPLE: [&str; 4] = ["track", "track_id", "person_id", "skeletonID"];
+pub(in crate::readers) const FRAMES: [&str; 6] =
+    ["frame_idx", "frameNumber", "frame", "frame_number", "frame_id", "frame_index"];
+pub(in crate::readers) const PEOPLE: [&str; 6] =
+    ["track", "track_id", "person", "person_id", "person_idx", "skeletonID"];
 
 struct Column {
     name: String,
@@ -44,25 +47,21 @@ pub fn read(
     let is_point = |name: &str| columns.iter().filter_map(coordinate).any(|(own, _)| own == name);
     // One kind counts: some tables have a score and a visibility of each point.
     let kind = columns.iter().filter_map(confidence).find_map(|(name, kind)| is_point(name).then_some(kind));
-    // Boxes have an x1, y1, x2 and y2.
-    let has_names = columns.iter().any(|column| coordinate(column).is_some());
-    let markers = markers_of::<4>(columns, |column| {
-        field(column, kind).or_else(|| numbered(column).filter(|_| !has_names))
-    })?;
-    let has_z = markers.iter().any(|(_, [_, _, depth, _])| depth.is_some());
-    let points: Vec<Column> = markers
-        .into_iter()
-        .filter_map(|(name, [x, y, depth, sure])| Some(Column { name, place: [x?, y?], depth, sure }))
-        .collect();
+    let (mut points, mut has_z) = points_of(columns, |column| field(column, kind))?;
+    let mut numbers = Vec::new();
+    if bodies(&points).is_empty() {
+        numbers = numbers_of(&points).unwrap_or_default();
+        // Next to the points of a person these are the x1, y1, x2 and y2 of a box.
+        let (others, has_depth) = points_of(columns, numbered)?;
+        if let Some(found) = numbers_of(&others).filter(|_| numbers.is_empty()) {
+            (points, has_z, numbers) = (others, has_depth, found);
+        }
+    }
     if points.is_empty() {
         return Ok(None);
     }
     let mut bodies = bodies(&points);
-    let mut numbers = Vec::new();
-    if bodies.is_empty()
-        && let Some(found) = numbers_of(&points)
-    {
-        numbers = found;
+    if !numbers.is_empty() {
         bodies.push(("", points.iter().enumerate().collect()));
     }
     let known: usize = bodies.iter().map(|(_, body)| body.len()).sum();
@@ -128,6 +127,19 @@ pub fn read(
     found(Document::of_frames(frames), choices, numbers.is_empty().then(about)).map(Some)
 }
 
+/// Columns of points, and whether one has a z.
+fn points_of(
+    columns: &StringRecord,
+    field: impl Fn(&str) -> Option<(&str, usize)>,
+) -> Result<(Vec<Column>, bool), RecordingError> {
+    let markers = markers_of::<4>(columns, field)?;
+    let has_z = markers.iter().any(|(_, [_, _, depth, _])| depth.is_some());
+    let point = |(name, [x, y, depth, sure]): (String, [Option<usize>; 4])| {
+        Some(Column { name, place: [x?, y?], depth, sure })
+    };
+    Ok((markers.into_iter().filter_map(point).collect(), has_z))
+}
+
 fn cell(row: &StringRecord, column: usize) -> &str {
     row.get(column).unwrap_or_default()
 }
@@ -152,18 +164,21 @@ fn body<'a>(points: &'a [Column], prefix: &str) -> Body<'a> {
     known.filter_map(|(at, name)| Some((place(&name)?, *own.get(at)?))).collect()
 }
 
-/// Numbers after a text that all names share, of as many points as a layout has. Numbered points in space without confidences
-/// are markers.
+/// Numbers after a text that all names share: of as many points as a layout has, or of what the text calls keypoints. Other
+/// numbered points in space without confidences are markers.
 fn numbers_of(points: &[Column]) -> Option<Vec<String>> {
-    Layout::of(points.len())
-        .filter(|_| points.iter().all(|point| point.depth.is_none() || point.sure.is_some()))?;
     let parts = |point: &Column| {
         let text = point.name.trim_end_matches(|c: char| c.is_ascii_digit());
-        (text.to_owned(), point.name[text.len()..].to_owned())
+        (text.to_ascii_lowercase(), point.name[text.len()..].to_owned())
     };
     let (texts, numbers): (Vec<String>, Vec<String>) = points.iter().map(parts).unzip();
-    let are_alike = texts.windows(2).all(|two| two[0] == two[1]);
-    (are_alike && numbers.iter().all(|number| !number.is_empty())).then_some(numbers)
+    let text = texts.first()?;
+    let is_named = ["keypoint", "landmark"].iter().any(|word| text.contains(word));
+    let is_layout = Layout::of(points.len()).is_some()
+        && points.iter().all(|point| point.depth.is_none() || point.sure.is_some());
+    let are_alike =
+        texts.iter().all(|other| other == text) && numbers.iter().all(|number| !number.is_empty());
+    (are_alike && (is_layout || is_named)).then_some(numbers)
 }
 
 /// Name of a point, and the kind of its confidence.
@@ -186,8 +201,9 @@ fn field<'a>(column: &'a str, kind: Option<&str>) -> Option<(&'a str, usize)> {
     mocapnet.or_else(|| coordinate(column)).or_else(sure)
 }
 
-/// Number of a point, and 0 for `x1`, 1 for `y1`, 2 for `z1`, 3 for the confidence `v1`.
+/// Number of a point, and 0 for `x1` or `x1_coord`, 1 for `y1`, 2 for `z1`, 3 for the confidence `v1`.
 fn numbered(column: &str) -> Option<(&str, usize)> {
+    let column = column.strip_suffix("_coord").unwrap_or(column);
     let axis = ['x', 'y', 'z', 'v'].iter().position(|axis| column.to_ascii_lowercase().starts_with(*axis))?;
     let number = column[1..].trim_start_matches('_');
     let is_number = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
@@ -302,6 +318,28 @@ mod tests {
         let found = expect_person(&format!("frame,x1,y1,x2,y2,x_1{header}\n0,1,2,3,4,5{row}\n"), 1);
         let remarks = found.remarks().join("; ");
         assert!(remarks.contains("13 of 13 named points"), "{remarks}");
+    }
+
+    #[test]
+    fn the_place_of_a_box_next_to_numbered_points_is_no_point() {
+        let place = |name: Option<usize>| {
+            let name = NAMES[name?].replace(' ', "_");
+            BODY.iter().find(|(known, _)| *known == name).map(|(_, place)| *place)
+        };
+        let coco = Layout::of(17).expect("COCO");
+        let row: String = coco
+            .places()
+            .map(place)
+            .map(|place| place.unwrap_or_default())
+            .fold(String::new(), |row, [x, y]| format!("{row},{x},{y}"));
+        for suffix in ["", "_coord"] {
+            let header: String = (1..=17).map(|n| format!(",x{n}{suffix},y{n}{suffix}")).collect();
+            let text = format!("frame,bbox_x,bbox_y,bbox_w{header}\n0,1,2,3{row}\n");
+            let found = read(&text, None).unwrap_or_else(|error| panic!("{error}: {text}"));
+            let remarks = found.remarks().join("; ");
+            assert!(remarks.contains("in the layout COCO"), "{remarks}");
+            assert!(found.by_name(0)["right wrist"][2] > found.by_name(0)["nose"][2]);
+        }
     }
 
     #[test]

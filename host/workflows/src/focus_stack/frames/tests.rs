@@ -2,7 +2,6 @@ use farnear_depth::{
     focus_stack::{StackSettings, depth_from_positions},
     prepare::warp::resample,
 };
-use ndarray::{Array2, s};
 
 use super::*;
 
@@ -141,6 +140,29 @@ fn finds_a_foreign_or_turned_frame_at_any_place() {
             found(&images, "turned");
         }
     }
+}
+
+/// Nothing but coarse texture is left in the last frame, below its noise in detail.
+#[test]
+fn a_last_frame_far_out_of_focus_is_kept_unless_it_is_foreign() {
+    let texture = |seed: u64| {
+        let scenes = [seed, seed + 1, seed + 2, seed + 3].map(scene);
+        Array2::from_shape_fn((216, 288), |(y, x)| {
+            scenes.iter().enumerate().map(|(k, scene)| scene[((y >> k) % 72, (x >> k) % 96)]).sum::<f32>()
+                / 4.0
+        })
+    };
+    let image = |texture: &Array2<f32>, number: usize, side: usize| {
+        let noise = scene(100 + number as u64);
+        let blurred = mean(&mean(texture, side), side);
+        Array2::from_shape_fn(texture.dim(), |(y, x)| blurred[(y, x)] + 0.1 * (noise[(y % 72, x % 96)] - 0.5))
+    };
+    let own = texture(1);
+    let mut images: Vec<Array2<f32>> =
+        [5, 3, 1, 3, 5, 9, 15].iter().enumerate().map(|(number, side)| image(&own, number, *side)).collect();
+    assert_eq!(left_out(&images, None), [0; 0]);
+    images[6] = image(&texture(21), 6, 15);
+    assert_eq!(left_out(&images, None), [6]);
 }
 
 #[test]

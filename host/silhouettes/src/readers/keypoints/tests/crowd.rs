@@ -33,3 +33,20 @@ fn a_person_is_followed_among_false_detections() {
     let seen = (0..100).filter(|n| found.by_name(*n).contains_key("neck")).count();
     assert_eq!(seen, 80);
 }
+
+#[test]
+fn a_collection_of_pictures_of_one_person_each_is_one_person_and_people_one_after_the_other_are_two() {
+    let read_at = |places: &[f64]| {
+        let of = |x: &f64| format!(r#"{{"pose_keypoints_2d":{}}}"#, flat(&person(layout(25), *x)));
+        let frames: Vec<String> = places.iter().map(|x| format!(r#"{{"people":[{}]}}"#, of(x))).collect();
+        let found = upright(&format!(r#"{{"frames":[{}]}}"#, frames.join(",")), places.len());
+        let seen = (0..places.len()).filter(|n| found.by_name(*n).contains_key("neck")).count();
+        (seen, found.remarks().join("; "))
+    };
+    let leaping: Vec<f64> = (0..12).map(|n| 1000.0 * f64::from(n * 7 % 12)).collect();
+    let (seen, remarks) = read_at(&leaping);
+    assert!(seen == 12 && remarks.contains("leaps between 12 places"), "{seen}: {remarks}");
+    let after_each_other: Vec<f64> = (0..12).map(|n| if n < 8 { 100.0 } else { 5000.0 }).collect();
+    let (seen, remarks) = read_at(&after_each_other);
+    assert!(seen == 8 && remarks.contains("2 people"), "{seen}: {remarks}");
+}

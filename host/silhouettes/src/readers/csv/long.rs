@@ -1,0 +1,333 @@
+//! Tables with a row for each point: the frame or its time, perhaps the person, the point's name or number, and `x`, `y`, perhaps
+//! `z` and a confidence. They become tables with a row for each frame (and person) and columns `NAME_x`. Linear in the file.
+
+use std::collections::{HashMap, HashSet};
+
+use csv::StringRecord;
+
+use super::{TIMES, check_width, line};
+use crate::readers::{
+    keypoints::table::{CONFIDENCES, FRAMES, PEOPLE},
+    recording::{RecordingError, number},
+};
+
+/// What columns of points' names are called, mostly with a word such as `_name` or `_id` after it.
+const POINTS: [&str; 8] = ["keypoint", "landmark", "bodypart", "joint", "marker", "point", "part", "node"];
+const WORDS: [&str; 5] = ["name", "id", "idx", "index", "number"];
+/// Cells of the other table for each row of this one; more are empty.
+const MOST_CELLS: usize = 20;
+
+struct Columns {
+    point: usize,
+    /// Its name, if the points have numbers.
+    numbered: Option<&'static str>,
+    /// Columns with the text after a point's name.
+    fields: Vec<(usize, String)>,
+    frame: Option<usize>,
+    time: Option<usize>,
+    person: Option<usize>,
+}
+
+impl Columns {
+    /// People of named points in space are prefixes of the names.
+    fn are_prefixes(&self) -> bool {
+        self.numbered.is_none() && self.fields.iter().any(|(_, field)| field == "z")
+    }
+}
+
+/// Rows of a frame and person with their points.
+struct Group<'a> {
+    frame: String,
+    first: &'a StringRecord,
+    rows: HashMap<usize, &'a StringRecord>,
+}
+
+/// The rows as they are, if they are not those of points.
+pub fn wide(rows: Vec<StringRecord>) -> Result<Vec<StringRecord>, RecordingError> {
+    let Some((header, below)) = rows.split_first() else { return Ok(rows) };
+    let Some(columns) = columns(header, below) else { return Ok(rows) };
+    let (names, groups) = grouped(&columns, header, below)?;
+    if names.len() * groups.len() > MOST_CELLS * below.len() {
+        let reason = format!(
+            "its {} rows hold {} different points in {} frames, expected most of the points in each frame",
+            below.len(),
+            names.len(),
+            groups.len()
+        );
+        return Err(RecordingError::Kind { kind: "CSV", reason });
+    }
+    let track = columns.person.filter(|_| !columns.are_prefixes());
+    let kept = [(track, "track"), (columns.time, "time")];
+    let kept: Vec<(usize, &str)> = kept.into_iter().filter_map(|(at, name)| Some((at?, name))).collect();
+    let mut all = StringRecord::from(vec!["frame"]);
+    kept.iter().for_each(|(_, name)| all.push_field(name));
+    for name in &names {
+        columns.fields.iter().for_each(|(_, field)| all.push_field(&format!("{name}_{field}")));
+    }
+    let mut table = vec![all];
+    for group in &groups {
+        let mut row = StringRecord::from(vec![group.frame.as_str()]);
+        row.set_position(group.first.position().cloned());
+        kept.iter().for_each(|(at, _)| row.push_field(&group.first[*at]));
+        for place in 0..names.len() {
+            let own = group.rows.get(&place);
+            columns.fields.iter().for_each(|(at, _)| row.push_field(own.map_or("", |own| &own[*at])));
+        }
+        table.push(row);
+    }
+    Ok(table)
+}
+
+fn columns(header: &StringRecord, below: &[StringRecord]) -> Option<Columns> {
+    let is_of = |column: &str, known: &[&str]| known.iter().any(|name| column.eq_ignore_ascii_case(name));
+    let place = |known: &[&str]| header.iter().position(|column| is_of(column, known));
+    let axes = ["x", "y", "z"].map(|axis| (place(&[axis, format!("{axis}_coord").as_str()]), axis));
+    let sure = header.iter().position(|column| is_of(column, &CONFIDENCES));
+    if axes[0].0.is_none() || axes[1].0.is_none() {
+        return None;
+    }
+    let fields = axes.into_iter().filter_map(|(at, axis)| Some((at?, axis.to_owned())));
+    let sure = sure.map(|at| (at, header[at].to_owned()));
+    let named: Vec<(usize, &'static str)> =
+        header.iter().enumerate().filter_map(|(at, column)| Some((at, point_column(column)?))).collect();
+    let is_number = |at: usize| {
+        let mut cells = below.iter().filter_map(|row| row.get(at));
+        cells.all(|cell| cell.is_empty() || whole(cell).is_some())
+    };
+    let by_name = named.iter().find(|(at, _)| !is_number(*at));
+    let (point, word) = *by_name.or_else(|| named.first())?;
+    Some(Columns {
+        point,
+        numbered: by_name.is_none().then_some(word),
+        fields: fields.chain(sure).collect(),
+        frame: place(&FRAMES),
+        time: place(&TIMES),
+        person: place(&PEOPLE).filter(|at| {
+            let people: HashSet<Option<&str>> = below.iter().map(|row| row.get(*at)).collect();
+            people.len() > 1
+        }),
+    })
+}
+
+/// The word for points in the name of a column that tells them apart.
+fn point_column(column: &str) -> Option<&'static str> {
+    let letters = column.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase());
+    let simple: String = letters.collect();
+    POINTS
+        .into_iter()
+        .find(|word| simple.strip_prefix(*word).is_some_and(|rest| rest.is_empty() || WORDS.contains(&rest)))
+}
+
+fn whole(cell: &str) -> Option<u32> {
+    let value = number(cell).filter(|value| value.fract() == 0.0 && (0.0..1e6).contains(value))?;
+    Some(value as u32)
+}
+
+/// Names of all points, and the rows by frame and person.
+fn grouped<'a>(
+    columns: &Columns,
+    header: &StringRecord,
+    below: &'a [StringRecord],
+) -> Result<(Vec<String>, Vec<Group<'a>>), RecordingError> {
+    let are_prefixes = columns.are_prefixes();
+    let (mut names, mut places) = (Vec::new(), HashMap::new());
+    let (mut groups, mut known): (Vec<Group<'a>>, HashMap<(String, &str), usize>) =
+        (Vec::new(), HashMap::new());
+    let mut times: HashMap<&str, usize> = HashMap::new();
+    // Without a frame and a time, a point that occurs again begins the next frame.
+    let (mut count, mut seen) = (0_usize, HashSet::new());
+    for row in below {
+        check_width(row, header)?;
+        let person = columns.person.map_or("", |at| &row[at]);
+        let point = &row[columns.point];
+        if point.is_empty() {
+            continue;
+        }
+        let frame = match (columns.frame, columns.time) {
+            (Some(at), _) => row[at].to_owned(),
+            (None, Some(at)) => {
+                let next = times.len();
+                times.entry(&row[at]).or_insert(next).to_string()
+            }
+            (None, None) => {
+                if !seen.insert((person, point)) {
+                    count += 1;
+                    seen = HashSet::from([(person, point)]);
+                }
+                count.to_string()
+            }
+        };
+        let name = match (columns.numbered, whole(point)) {
+            (Some(word), Some(number)) => format!("{word}_{number}"),
+            _ if are_prefixes && !person.is_empty() => format!("{person}:{point}"),
+            _ => point.to_owned(),
+        };
+        let place = *places.entry(name).or_insert_with_key(|name| {
+            names.push(name.clone());
+            names.len() - 1
+        });
+        let key = (frame, if are_prefixes { "" } else { person });
+        let group = *known.entry(key).or_insert_with_key(|(frame, _)| {
+            groups.push(Group { frame: frame.clone(), first: row, rows: HashMap::new() });
+            groups.len() - 1
+        });
+        let group = &mut groups[group];
+        if group.rows.insert(place, row).is_some() {
+            let reason = format!(
+                "a second row of the point `{}` in frame {}, expected one: a column such as person_id tells people apart",
+                names[place], group.frame
+            );
+            return Err(RecordingError::Line { line: line(row), reason });
+        }
+    }
+    Ok((names, groups))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::readers::{
+        self,
+        recording::{Choices, Recording, RecordingError},
+    };
+
+    /// COCO's points without eyes and ears, 170 pixels tall.
+    const BODY: [(usize, &str, [f64; 2]); 13] = [
+        (0, "nose", [100.0, 30.0]),
+        (5, "left_shoulder", [118.0, 50.0]),
+        (6, "right_shoulder", [82.0, 50.0]),
+        (7, "left_elbow", [124.0, 78.0]),
+        (8, "right_elbow", [76.0, 78.0]),
+        (9, "left_wrist", [126.0, 104.0]),
+        (10, "right_wrist", [74.0, 104.0]),
+        (11, "left_hip", [109.0, 100.0]),
+        (12, "right_hip", [91.0, 100.0]),
+        (13, "left_knee", [109.0, 142.0]),
+        (14, "right_knee", [91.0, 142.0]),
+        (15, "left_ankle", [109.0, 184.0]),
+        (16, "right_ankle", [91.0, 184.0]),
+    ];
+
+    fn read(header: &str, rows: &[String], person: Option<usize>) -> Result<Recording, RecordingError> {
+        let text = format!("{header}\n{}\n", rows.join("\n"));
+        readers::read(text.as_bytes(), "csv", Choices { person, ..Choices::default() })
+    }
+
+    /// Rows of all points in two frames.
+    fn rows(row: impl Fn(usize, usize, &str, [f64; 2]) -> String) -> Vec<String> {
+        let frame = |frame: usize| BODY.map(|(number, name, place)| row(frame, number, name, place));
+        (0..2).flat_map(frame).collect()
+    }
+
+    #[track_caller]
+    fn expect_person(header: &str, rows: &[String]) -> Recording {
+        let found = read(header, rows, None).unwrap_or_else(|error| panic!("{error}: {header}"));
+        assert_eq!(found.frames.len(), 2, "{header}");
+        for frame in 0..2 {
+            let points = found.by_name(frame);
+            let height = points["nose"][2] - points["left ankle"][2];
+            assert!(found.planar && (1300.0..1800.0).contains(&height), "{header}: {height} mm");
+            assert!(points["left shoulder"][0] > points["right shoulder"][0]);
+        }
+        found
+    }
+
+    #[test]
+    fn rows_of_points_by_name_or_number_are_frames() {
+        let named = rows(|frame, _, name, [x, y]| format!("{frame},{name},{x},{y},0.9"));
+        for column in ["bodypart", "keypoint_name", "joint", "Landmark"] {
+            expect_person(&format!("frame,{column},x,y,confidence"), &named);
+        }
+        // As pandas melts them: all frames of a point, then those of the next.
+        let mut melted = named.clone();
+        melted.sort_by_key(|row| row.split(',').nth(1).map(str::to_owned));
+        expect_person("frame,keypoint,x,y,likelihood", &melted);
+        let numbered = rows(|frame, number, _, [x, y]| format!("{frame},{number},{x},{y}"));
+        let remarks = expect_person("frame,keypoint,x,y", &numbered).remarks().join("; ");
+        assert!(remarks.contains("from 0 up to 16, in the layout COCO (a guess)"), "{remarks}");
+        let both =
+            rows(|frame, number, name, [x, y]| format!("{},{number},{name},{x},{y}", 0.04 * frame as f64));
+        assert_eq!(expect_person("time,landmark_id,landmark_name,x,y", &both).rate_hz, 25.0);
+        let alone = rows(|_, _, name, [x, y]| format!("{name},{x},{y}"));
+        expect_person("keypoint,x_coord,y_coord", &alone);
+    }
+
+    #[test]
+    fn landmarks_of_mediapipe_have_the_depth_of_a_picture() {
+        let row = |frame: usize, number: usize| {
+            let name = match number {
+                0 => "nose",
+                11 => "left_shoulder",
+                12 => "right_shoulder",
+                23 => "left_hip",
+                24 => "right_hip",
+                27 => "left_ankle",
+                28 => "right_ankle",
+                _ => "left_knee",
+            };
+            let place =
+                BODY.iter().find(|(_, known, _)| *known == name).map_or([1.0; 2], |(_, _, place)| *place);
+            format!("{frame},{number},{},{},-0.2", place[0] / 320.0, place[1] / 200.0)
+        };
+        let rows: Vec<String> =
+            (0..2).flat_map(|frame| (0..33).map(move |number| row(frame, number))).collect();
+        let remarks = expect_person("frame,landmark,x,y,z", &rows).remarks().join("; ");
+        assert!(remarks.contains("in the layout MediaPipe"), "{remarks}");
+    }
+
+    #[test]
+    fn rows_of_several_people_are_followed_in_pictures_and_in_space() {
+        let of =
+            |person: usize, frame: usize, name: &str, place: &str| format!("{frame},{person},{name},{place}");
+        let flat = rows(|frame, _, name, [x, y]| {
+            [0, 1]
+                .map(|person| of(person, frame, name, &format!("{},{y}", x + 300.0 * person as f64)))
+                .join("\n")
+        });
+        let found = read("frame,person_id,keypoint,x,y", &flat, Some(2)).expect("two people");
+        assert!(found.frames.len() == 2 && found.remarks().join("; ").contains("2 people"));
+        let in_space = rows(|frame, _, name, [x, y]| {
+            let place = |person: usize| format!("{},{},{}", 10.0 * x, 2000 * person + 5, 1900.0 - 10.0 * y);
+            [0, 1].map(|person| of(person, frame, name, &place(person))).join("\n")
+        });
+        let found = read("frame,person,marker,x,y,z", &in_space, Some(2)).expect("two people");
+        assert!(!found.planar && found.frames.len() == 2);
+        assert_eq!(found.by_name(1)["left_knee"], [1090.0, 2005.0, 480.0]);
+        assert!(read("frame,person,marker,x,y,z", &in_space, Some(3)).is_err());
+    }
+
+    #[test]
+    fn a_point_twice_in_a_frame_and_points_of_no_common_frames_are_refused() {
+        let named = rows(|_, _, name, [x, y]| format!("7,{name},{x},{y}"));
+        let error = read("frame,keypoint,x,y", &named, None).expect_err("twice").to_string();
+        assert!(error.starts_with("line 15: a second row of the point `nose` in frame 7"), "{error}");
+        let sparse: Vec<String> = (0..100).map(|n| format!("{n},p{n},1,2")).collect();
+        let error = read("frame,keypoint,x,y", &sparse, None).expect_err("sparse").to_string();
+        assert!(error.contains("100 rows hold 100 different points in 100 frames"), "{error}");
+        let error = read("frame,keypoint,x,y", &["0,nose,1".into(), "0,left_knee,1,2".into()], None);
+        assert!(error.expect_err("a cell too few").to_string().starts_with("line 2: 3 values"));
+    }
+
+    #[test]
+    fn openpose_numbers_without_ankles_are_distinguished_from_coco_by_the_neck() {
+        let places: [[f64; 2]; 13] = [
+            [100.0, 30.0],
+            [100.0, 50.0],
+            [82.0, 50.0],
+            [76.0, 78.0],
+            [74.0, 104.0],
+            [118.0, 50.0],
+            [124.0, 78.0],
+            [126.0, 104.0],
+            [91.0, 100.0],
+            [91.0, 142.0],
+            [91.0, 184.0],
+            [109.0, 100.0],
+            [109.0, 142.0],
+        ];
+        let row = |(number, [x, y]): (usize, &[f64; 2])| format!("0,{number},{x},{y}");
+        let rows: Vec<String> = places.iter().enumerate().map(row).collect();
+        let found = read("frame,keypoint,x,y", &rows, None).expect("a person");
+        assert!(found.remarks().join("; ").contains("in the layout OpenPose COCO"), "{:?}", found.remarks());
+        assert!(found.by_name(0)["left knee"][0] > found.by_name(0)["right knee"][0]);
+    }
+}
