@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 
 use crate::{
     arrays::{Image, check_alike, named, optics_named},
-    errors::{FarnearError, wrong},
+    errors::{FarnearError, parsed, wrong},
     optics::{Optics, psf_text},
     work,
 };
@@ -144,7 +144,7 @@ pub fn calibrate_psf<'py>(
     align: &str,
 ) -> PyResult<PsfFit> {
     let model: Model = model.parse().map_err(wrong)?;
-    let align: Align = align.parse().map_err(wrong)?;
+    let align: Align = parsed("align", align)?;
     let optics = &*optics_named("optics", optics)?;
     let mut owned = Vec::with_capacity(pairs.len());
     for (index, (far, near, true_mm)) in pairs.iter().enumerate() {

@@ -3,11 +3,11 @@
 use farnear_depth::{
     adaptive_window::Window,
     fill::{FillBy, LowTexture},
-    measure::{DepthMethod, Finding, MeasureError, MeasureSettings, binned, measure_pair_of_views},
+    measure::{DepthMethod, Finding, MeasureSettings, binned, measure_pair_of_views},
     mosaic::is_mosaic,
     operators,
     pipeline::{self, Settings},
-    prepare::{Align, Balance, PrepareSettings},
+    prepare::PrepareSettings,
 };
 use farnear_workflows::{
     depth::DepthRequest,
@@ -22,7 +22,7 @@ use pyo3::{exceptions::PyTypeError, prelude::*};
 use crate::{
     arrays::{Image, check_alike, named, optics_named},
     depth_map::DepthMap,
-    errors::{FarnearError, wrong},
+    errors::{FarnearError, parsed, wrong},
     optics::{Operators, Optics},
     work,
 };
@@ -168,7 +168,8 @@ pub fn depth(
         return Err(FarnearError::new_err(format!("min_confidence is {min_confidence}; expected 0 to 1")));
     }
     check_alike(("far", far.full_scale()), ("near", near.full_scale()))?;
-    let mut doubts: Vec<OpticsDoubt> = another_size(&optics.0, far.view().dim()).into_iter().collect();
+    let mut doubts: Vec<OpticsDoubt> = optics.0.doubts().into_iter().map(OpticsDoubt::Unusual).collect();
+    doubts.extend(another_size(&optics.0, far.view().dim()));
     let side = bin.side(&optics.0, &far, operators.is_some(), &mut doubts)?;
     let averaged = (side > 1).then(|| Optics(optics.0.binned(side)));
     let optics = averaged.as_ref().unwrap_or(optics);
@@ -190,14 +191,14 @@ pub fn depth(
         })?),
     };
     let window: Window = match window {
-        Some(window) => window.to_string().parse().map_err(wrong)?,
+        Some(window) => parsed("window", &window.to_string())?,
         None => method.usual_window(),
     };
     let smoothing_px = if let Window::Fixed(side) = window { side } else { 7 };
     let settings = MeasureSettings {
         prepare: PrepareSettings {
-            align: align.parse::<Align>().map_err(wrong)?,
-            balance: balance.parse::<Balance>().map_err(wrong)?,
+            align: parsed("align", align)?,
+            balance: parsed("balance", balance)?,
             limits: limits(&far, white_level)?,
             ..PrepareSettings::default()
         },
@@ -311,7 +312,9 @@ impl Processor {
     ) -> PyResult<Self> {
         let optics = &*optics_named("optics", optics)?;
         if optics.0.stage().is_some() {
-            return Err(wrong(MeasureError::LearnedForWhitened));
+            return Err(FarnearError::new_err(
+                "the optics were learned by calibrate stack for method whitened, which a Processor lacks: use farnear.depth",
+            ));
         }
         let settings = Settings { smoothing_px, median_px, threads, ..filling(&fill, low_texture)? };
         let make = |operators: &operators::Operators| {

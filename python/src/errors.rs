@@ -1,6 +1,6 @@
 //! Errors as exceptions.
 
-use std::{error::Error, io, path::Path};
+use std::{error::Error, fmt::Display, io, path::Path, str::FromStr};
 
 use pyo3::{
     create_exception,
@@ -31,6 +31,14 @@ pub fn read_text(path: &Path) -> PyResult<String> {
 /// A library's error with its causes in one line, as a `FarnearError`.
 pub fn wrong(error: impl Error) -> PyErr {
     FarnearError::new_err(message(&error))
+}
+
+/// An argument that is a name; the message of an error states both.
+pub fn parsed<T: FromStr>(name: &str, text: &str) -> PyResult<T>
+where
+    T::Err: Display,
+{
+    text.parse::<T>().map_err(|error| FarnearError::new_err(format!("{name} is {text}; {error}")))
 }
 
 pub fn rig(error: impl Error) -> PyErr {

@@ -82,6 +82,7 @@ def test_what_is_no_pair_is_refused(optics, slant):
     far, near, _ = slant
     for images, error, match in [
         ((far, near[1:]), farnear.FarnearError, "one size"),
+        ((far, far), farnear.FarnearError, "the same image"),
         ((far, near / 255.0), farnear.FarnearError, "scales differ"),
         ((far, np.zeros_like(near)), farnear.FarnearError, "constant"),
         ((far, near.astype(str)), TypeError, "near.*floating point"),
@@ -95,10 +96,12 @@ def test_what_is_no_pair_is_refused(optics, slant):
     other = farnear.Operators(wider)
     for settings, match in [
         ({"method": "magic"}, "magic.*whitened"),
-        ({"window": 8}, "odd"),
+        ({"window": 8}, "window is 8; expected adaptive or an odd number"),
+        ({"window": "big"}, "window is big; expected adaptive"),
         ({"operators": other}, "largest blur"),
         ({"operators": other, "method": "whitened"}, "no operators"),
-        ({"align": "sideways"}, "similarity"),
+        ({"align": "sideways"}, "align is sideways; expected one of.*similarity"),
+        ({"balance": "y"}, "balance is y; expected one of.*local"),
     ]:
         with pytest.raises(farnear.FarnearError, match=match):
             farnear.depth(far, near, optics, **settings)

@@ -333,8 +333,15 @@ def test_a_target_inside_the_focal_length_is_refused(optics, slant, distance_mm)
 
 def test_a_processor_refuses_optics_that_were_learned_for_another_method(learned, slant):
     for use in (lambda: farnear.Processor(learned), lambda: farnear.depth(*slant[:2], learned, method="ro")):
-        with pytest.raises(farnear.FarnearError, match="learned by calibrate stack for method whitened"):
+        with pytest.raises(farnear.FarnearError, match="learned by calibrate stack for method whitened") as refused:
             use()
+        assert "--" not in str(refused.value), "an option of the command line"
+
+
+def test_optics_in_another_unit_are_a_finding(optics, slant):
+    settings = {"focal_length_mm": 50, "aperture_mm": 12.8, "far_mm": 933, "max_blur_px": 2.703, "psf": optics.psf}
+    findings = farnear.depth(*slant[:2], farnear.Optics(pixel_um=0.0074, **settings)).findings
+    assert any("pixel_um is 0.0074 um" in finding and "another unit" in finding for finding in findings), findings
 
 
 def test_a_blur_that_is_too_large_is_a_finding(optics):

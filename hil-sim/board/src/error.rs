@@ -2,6 +2,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+/// The text has no causes: print it with its sources, as `{:#}` of `anyhow` does.
 #[derive(Debug, Error)]
 pub enum SimError {
     #[error("{} has {length} bytes, the board's memory {expected}: name a file that an earlier run wrote, or a new one", path.display())]
@@ -25,10 +26,10 @@ pub enum SimError {
     Emulator(String),
     #[error("the emulated board has stopped")]
     Stopped,
-    #[error("{what}: {source}")]
+    #[error("{what}")]
     Io { what: String, source: std::io::Error },
     #[cfg(unix)]
-    #[error("cannot make a pty: {0}")]
+    #[error("cannot make a pty")]
     Port(#[from] serialport::Error),
     #[error("the camera cannot render: {0}")]
     Scene(String),

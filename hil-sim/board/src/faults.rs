@@ -123,15 +123,21 @@ mod tests {
     #[test]
     fn docs_describe_each_fault_kind_and_moment_once() {
         let page = include_str!("../../../docs/hil.md");
-        let rows =
-            |name: &str| page.lines().filter(|line| line.starts_with(&format!("| `{name}` |"))).count();
+        let rows = |name: &str| -> Vec<&str> {
+            page.lines().filter(|line| line.starts_with(&format!("| `{name}` |"))).collect()
+        };
         for kind in KINDS {
-            assert_eq!(rows(kind.name), 1, "docs/hil.md and {}", kind.name);
+            let rows = rows(kind.name);
+            assert_eq!(rows.len(), 1, "docs/hil.md and {}", kind.name);
+            if let Some(Amount { min, max, usual }) = kind.takes.amount {
+                let amount = format!("`amount` ({min} to {max}, default {usual})");
+                assert!(rows[0].contains(&amount), "docs/hil.md and {}: {amount}", kind.name);
+            }
         }
         for moment in Moment::ALL {
             let name = toml::Value::try_from(moment).expect("a name");
             let name = name.as_str().expect("a string").to_string();
-            assert_eq!(rows(&name), 1, "docs/hil.md and {name}");
+            assert_eq!(rows(&name).len(), 1, "docs/hil.md and {name}");
         }
     }
 }

@@ -1,6 +1,10 @@
 //! File with the bytes of the FRAM, kept between runs.
 
-use std::{fs, io::ErrorKind, path::Path};
+use std::{
+    fs,
+    io::ErrorKind,
+    path::{Path, PathBuf},
+};
 
 use rigless::chip::fram::SIZE;
 
@@ -22,8 +26,18 @@ pub fn read(path: &Path) -> Result<Option<Box<[u8; SIZE]>>, SimError> {
     contents.map(Some).map_err(|_| SimError::Memory { path: path.into(), length, expected: SIZE })
 }
 
+fn aside(path: &Path) -> PathBuf {
+    path.with_added_extension(format!("partial-{}", std::process::id()))
+}
+
+/// Fails if [`write`] cannot create the file, which it calls only at the end of a run.
+pub fn check_writable(path: &Path) -> Result<(), SimError> {
+    let aside = aside(path);
+    fs::write(&aside, []).and_then(|()| fs::remove_file(&aside)).map_err(failed("write", path))
+}
+
 pub fn write(path: &Path, contents: &[u8]) -> Result<(), SimError> {
-    let aside = path.with_added_extension(format!("partial-{}", std::process::id()));
+    let aside = aside(path);
     let written = fs::write(&aside, contents).and_then(|()| fs::rename(&aside, path));
     written.map_err(|error| {
         let _ = fs::remove_file(&aside);
@@ -40,6 +54,9 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("memory.bin");
         assert!(read(&path).expect("a missing file is accepted").is_none());
+        check_writable(&path).expect("writable");
+        assert_eq!(fs::read_dir(folder.path()).expect("readable").count(), 0, "the check leaves nothing");
+        assert!(check_writable(&folder.path().join("absent/memory.bin")).is_err());
         let mut contents = [0; SIZE];
         contents[77] = 0xa5;
         write(&path, &contents).expect("writable");

@@ -155,6 +155,7 @@ pub fn launch(config: &RigConfig, outlets: Outlets, script: Option<Script>) -> R
     let fingerprint = firmware::fingerprint(image.bytes());
     let mut board = RigBoard::new(&plant, line.clone(), (config.seed, fingerprint), &config.parts, costs)
         .map_err(|error| emulator(&error))?;
+    config.memory.as_deref().map_or(Ok(()), memory_file::check_writable)?;
     if let Some(file) = &config.memory
         && let Some(contents) = memory_file::read(file)?
         && !script_given

@@ -65,7 +65,7 @@ pub struct Picture {
 }
 
 #[derive(Debug, Error)]
-#[error("{what}: {source}")]
+#[error("{what}")]
 pub struct OpenError {
     pub what: String,
     pub source: std::io::Error,

@@ -106,7 +106,7 @@ pub enum MeasureError {
     Run(#[from] RunError),
     #[error(transparent)]
     Baseline(#[from] BaselineError),
-    #[error("the optics were learned by calibrate stack for method whitened: use --method whitened")]
+    #[error("the optics were learned by calibrate stack for method whitened: use that method")]
     LearnedForWhitened,
     #[error("window adaptive is for method whitened: give a number of pixels")]
     FixedWindow,
@@ -156,7 +156,17 @@ pub fn measure_pair(
     camera: Option<&CameraFrames>,
     settings: &MeasureSettings,
 ) -> Result<Measurement, MeasureError> {
+    let [far, near] = &images;
+    if is_same(far.view(), near.view()) {
+        return Err(RunError::SameImage.into());
+    }
     measure_after(&mut None, &Bank::whitened(optics)?, images, optics, method, camera, settings)
+}
+
+/// Whether all pixels are alike; NaN (transparent) is alike NaN.
+fn is_same(far: ArrayView2<f32>, near: ArrayView2<f32>) -> bool {
+    let alike = |(a, b): (&f32, &f32)| a == b || a.is_nan() && b.is_nan();
+    far.dim() == near.dim() && far.iter().zip(near).all(alike)
 }
 
 /// [`measure_pair`] of the next pair of a rig, as [`prepare_after`]; `white` is of the optics.

@@ -51,6 +51,8 @@ pub enum RunError {
     NothingFinite,
     #[error("the {which} image is constant ({value}): depth needs texture")]
     Constant { which: &'static str, value: f32 },
+    #[error("far and near hold the same image: depth needs one focused far and one focused near")]
+    SameImage,
     #[error("{what} window of {size} px: must be odd and from 1 to {largest}")]
     Window { what: &'static str, size: usize, largest: usize },
     #[error(

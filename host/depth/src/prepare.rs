@@ -153,6 +153,8 @@ pub enum PrepareError {
         because: Option<Mismatch>,
     },
     #[error(transparent)]
+    Optics(#[from] crate::optics::OpticsError),
+    #[error(transparent)]
     Camera(#[from] CameraError),
 }
 
@@ -288,6 +290,7 @@ pub(crate) fn prepare_after(
     let Some(distortion) = optics.distortion() else {
         return finish(last, [far, near], None, marks, optics, settings);
     };
+    distortion.check_centre(size)?;
     // Interpolation takes noise away, so it is measured before.
     let noise = settings.noise.or_else(|| noise::of_pair(far.view(), near.view()));
     let recorded = Recorded { near: near.clone(), distortion };

@@ -32,6 +32,7 @@ impl<R: Request + Args> Run<R> {
     fn run_in(self, context: &Context<'_>) -> Result<()> {
         let Self { request, json } = self;
         outputs::check(&request)?;
+        outputs::check_folders(&request)?;
         let figures = request.run(context)?;
         report::print(&figures, json)?;
         Ok(R::verdict(&figures)?)

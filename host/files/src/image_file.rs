@@ -2,15 +2,16 @@
 //!
 //! | format | supported |
 //! |---|---|
-//! | PNG, BMP, PGM/PPM | all that `image` reads |
+//! | PNG, BMP, PBM/PGM/PPM/PAM | all that `image` reads |
 //! | JPEG | complete files only (`zune-jpeg`, strict mode) |
-//! | TIFF, BigTIFF | 1 to 16-bit and 32-bit integers, 16 to 64-bit float, grey and RGB, planar or not, strips or tiles (planes in padded tiles are refused) |
+//! | TIFF, BigTIFF | 1 to 16-bit and 32-bit integers, 16 to 64-bit float, grey, RGB and palettes of up to 8 bits, planar or not, strips or tiles (planes in padded tiles are refused) |
 //!
 //! The content, not the name, selects the format. EXIF orientation is applied. Raw camera files, previews and other
 //! formats are rejected with a remedy. `file.tif#3` is page 3 (from 1) of a multi-page TIFF. Colour becomes
 //! `(R + G + B) / 3`, as in Li 2014, unless [`Grey`] differs. Pixels whose alpha is 0 are NaN, unless all have it; other alpha is
 //! ignored.
 
+mod bmp;
 mod complete;
 mod decode;
 pub(crate) mod metadata;
@@ -195,6 +196,8 @@ pub enum ImageError {
     Empty { path: PathBuf },
     #[error("{} is not an image that farnear reads (PNG, TIFF, JPEG, BMP, PGM): {reason}", path.display())]
     Format { path: PathBuf, reason: String },
+    #[error("{}: {reason}", path.display())]
+    Setting { path: PathBuf, reason: String },
     #[error("cannot write {}: {reason}", path.display())]
     Write { path: PathBuf, reason: String },
 }
@@ -223,7 +226,7 @@ pub fn read_grey(path: &Path) -> Result<GreyImage, ImageError> {
 
 pub fn read_grey_with(path: &Path, settings: &ReadSettings) -> Result<GreyImage, ImageError> {
     let (decoded, path) = read_decoded(path)?;
-    decoded.grey(settings).map_err(|reason| ImageError::Format { path, reason })
+    decoded.grey(settings).map_err(|reason| ImageError::Setting { path, reason })
 }
 
 /// Reads with 8 bits per sample: grey, or RGB (height, width, 3). 16 bits keep their upper half; floats are rejected.

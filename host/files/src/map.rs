@@ -24,9 +24,9 @@ pub enum MapError {
     Read { path: PathBuf, source: std::io::Error },
     #[error("{} is empty", path.display())]
     Empty { path: PathBuf },
-    #[error("{} is not a map, a 2-D array of f32 or f64: {reason}", path.display())]
+    #[error("{} is not a map, a 2-D array of f16, f32 or f64: {reason}", path.display())]
     Npy { path: PathBuf, reason: NpyError },
-    #[error("{} is neither .npy nor TIFF: {reason}", path.display())]
+    #[error("{} is not a map that farnear reads (.npy, float TIFF): {reason}", path.display())]
     Format { path: PathBuf, reason: String },
     #[error("{} is not a mask: {reason}", path.display())]
     Mask { path: PathBuf, reason: String },
@@ -46,13 +46,15 @@ pub struct NoData {
     pub pixels: usize,
 }
 
+/// Reads a file, or a page of one (`file.tif#3`).
 pub fn read(path: &Path) -> Result<Array2<f32>, MapError> {
     Ok(read_with_nodata(path)?.0)
 }
 
 /// Pixels of the value that GDAL's tag of a TIFF states for holes are NaN.
 pub fn read_with_nodata(path: &Path) -> Result<(Array2<f32>, Option<NoData>), MapError> {
-    let bytes = std::fs::read(path).map_err(|source| MapError::Read { path: path.into(), source })?;
+    let (file, page) = image_file::file_and_page(path);
+    let bytes = std::fs::read(&file).map_err(|source| MapError::Read { path: path.into(), source })?;
     if bytes.is_empty() {
         return Err(MapError::Empty { path: path.into() });
     }
@@ -60,8 +62,9 @@ pub fn read_with_nodata(path: &Path) -> Result<(Array2<f32>, Option<NoData>), Ma
         let values = npy::read(&bytes).map_err(|reason| MapError::Npy { path: path.into(), reason })?;
         return Ok((values, None));
     }
-    let image =
-        image_file::decode_grey(&bytes).map_err(|reason| MapError::Format { path: path.into(), reason })?;
+    let image = image_file::decode_with(&bytes, page, Signed::Refused)
+        .and_then(|decoded| decoded.grey(&ReadSettings::default()))
+        .map_err(|reason| MapError::Format { path: path.into(), reason })?;
     if image.samples != image_file::Samples::Float {
         return Err(MapError::Integers { path: path.into(), samples: image.samples });
     }
@@ -86,13 +89,14 @@ fn nodata(tiff: &[u8]) -> Option<f32> {
 
 /// Where a mask is not 0: an image without lossy compression, or a `.npy` of bool, integers or floats.
 pub fn read_mask(path: &Path) -> Result<Array2<bool>, MapError> {
-    let bytes = image_file::read_bytes(path)?;
+    let (file, page) = image_file::file_and_page(path);
+    let bytes = image_file::read_bytes(&file)?;
     if bytes.starts_with(npy::MAGIC) {
         return npy::read_mask(&bytes)
             .map_err(|error| MapError::Mask { path: path.into(), reason: error.to_string() });
     }
     let refused = |reason: String| ImageError::Format { path: path.into(), reason };
-    let decoded = image_file::decode_with(&bytes, Signed::AsUnsigned).map_err(refused)?;
+    let decoded = image_file::decode_with(&bytes, page, Signed::AsUnsigned).map_err(refused)?;
     if decoded.only_alpha_differs() {
         let reason = "all its pixels have one colour and differ only in alpha: store the mask as grey".into();
         return Err(refused(reason).into());
@@ -279,6 +283,25 @@ mod tests {
         encoder.write_image::<tiff::encoder::colortype::RGB32Float>(1, 1, &[1.0, 2.0, 900.0]).unwrap();
         let (_folder, path) = stored("xyz.tif", bytes.get_ref());
         assert!(matches!(read(&path), Err(MapError::Colours { .. })));
+    }
+
+    #[test]
+    fn a_page_of_a_file_is_read_by_its_number() {
+        let mut bytes = Cursor::new(Vec::new());
+        let mut encoder = TiffEncoder::new(&mut bytes).unwrap();
+        for value in [5.0, 0.0] {
+            encoder.write_image::<Gray32Float>(1, 1, &[value]).unwrap();
+        }
+        let (_folder, path) = stored("two.tif", bytes.get_ref());
+        let page = |number: usize| PathBuf::from(format!("{}#{number}", path.display()));
+        assert_eq!((read(&page(1)).unwrap(), read(&page(2)).unwrap()), (array![[5.0]], array![[0.0]]));
+        assert_eq!(read_mask(&page(1)).unwrap(), array![[true]]);
+        assert_eq!(read_mask(&page(2)).unwrap(), array![[false]]);
+        for (path, part) in [(page(3), "numbered from 1 to 2"), (path.clone(), "FILE#1")] {
+            let error = read(&path).unwrap_err().to_string();
+            assert!(error.contains(part) && error.contains("reads (.npy, float TIFF)"), "{error}");
+            assert!(read_mask(&path).unwrap_err().to_string().contains(part));
+        }
     }
 
     #[test]

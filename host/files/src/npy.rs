@@ -1,4 +1,4 @@
-//! `.npy`, NumPy's array format (NumPy Enhancement Proposal 1), for maps: two axes of f32 or f64. A file has
+//! `.npy`, NumPy's array format (NumPy Enhancement Proposal 1), for maps: two axes of f16, f32 or f64. A file has
 //! `\x93NUMPY`, the version (two bytes), the header length (little-endian; two bytes in version 1, four in 2 and 3),
 //! the header (a Python dictionary padded with blanks and a line feed) and the values. Reads both byte and axis orders;
 //! writes little-endian f32 by rows. Reasons for an own implementation: `docs/decisions/0011-npy.md`.
@@ -34,9 +34,9 @@ pub enum NpyError {
     },
     #[error("its header has no '{key}'")]
     Missing { key: &'static str },
-    #[error("its values are '{descr}', and '<f4', '>f4', '<f8' and '>f8' are read")]
+    #[error("its values are '{descr}', and floats ('f2', 'f4' and 'f8', of either byte order) are read")]
     Kind { descr: String },
-    #[error("its values are '{descr}', and a mask has bool, integers, f32 or f64")]
+    #[error("its values are '{descr}', and a mask has bool, integers, f16, f32 or f64")]
     MaskKind { descr: String },
     #[error("its shape is {shape:?}, and a map has two axes (height, width)")]
     Axes { shape: Vec<usize> },
@@ -80,12 +80,26 @@ pub fn read_mask(bytes: &[u8]) -> Result<Array2<bool>, NpyError> {
 /// `None` for other kinds; within, `None` for a part of a number at the end.
 fn floats(descr: &str, values: &[u8]) -> Option<Option<Vec<f32>>> {
     Some(match descr {
+        "<f2" => numbers(values, |bytes| half(u16::from_le_bytes(bytes))),
+        ">f2" => numbers(values, |bytes| half(u16::from_be_bytes(bytes))),
         "<f4" => numbers(values, f32::from_le_bytes),
         ">f4" => numbers(values, f32::from_be_bytes),
         "<f8" => numbers(values, |bytes| f64::from_le_bytes(bytes) as f32),
         ">f8" => numbers(values, |bytes| f64::from_be_bytes(bytes) as f32),
         _ => return None,
     })
+}
+
+/// A float of 16 bits (IEEE 754, binary16).
+fn half(bits: u16) -> f32 {
+    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f32::from(bits & 0x3ff));
+    let magnitude = match exponent {
+        0 => fraction * 2_f32.powi(-24),
+        31 if fraction > 0.0 => f32::NAN,
+        31 => f32::INFINITY,
+        _ => (1024.0 + fraction) * 2_f32.powi(exponent - 25),
+    };
+    if bits >> 15 == 0 { magnitude } else { -magnitude }
 }
 
 fn array<T: Clone>(header: Header, numbers: Option<Vec<T>>, found: usize) -> Result<Array2<T>, NpyError> {
@@ -203,6 +217,17 @@ mod tests {
         for (descr, values) in [("<f4", &little4), (">f4", &big4), ("<f8", &little8), (">f8", &big8)] {
             assert_eq!(of_kind(descr, values).unwrap(), expected, "{descr}");
         }
+        let halves = [0x634b_u16, 0xc000];
+        let little2 = halves.map(u16::to_le_bytes).concat();
+        let big2 = halves.map(u16::to_be_bytes).concat();
+        for (descr, values) in [("<f2", &little2), (">f2", &big2)] {
+            assert_eq!(of_kind(descr, values).unwrap(), expected, "{descr}");
+        }
+        assert_eq!(
+            [0x0001, 0x8000, 0x7bff, 0xfc00].map(half),
+            [2_f32.powi(-24), 0.0, 65504.0, f32::NEG_INFINITY]
+        );
+        assert!(half(0x7e00).is_nan());
         // As written by NumPy 1 on Python 2, NumPy 2 and ndarray-npy, and in other key orders.
         for header in [
             "{'descr': '<f4', 'fortran_order': False, 'shape': (1L, 2L), }     \n",

@@ -1,6 +1,7 @@
 //! Focus stacks: files of a folder, or pages of a TIFF with positions. Positions come from the ImageJ description
 //! (`spacing`, `unit`), OME-XML (`PositionZ` of each plane, else `PhysicalSizeZ`) or Micro-Manager's page tag
-//! (`ZPositionUm`), for files with one plane each from the OME-XML of the first; the pixel size from OME-XML (`PhysicalSizeX`) or an ImageJ file's resolution.
+//! (`ZPositionUm`), for files with one plane each from the OME-XML of the first; the size of square pixels from OME-XML
+//! (`PhysicalSizeX`, `PhysicalSizeY`), an ImageJ file's resolution or ImageJ2's `scales`.
 
 mod folder;
 mod names;
@@ -69,11 +70,12 @@ fn folder(path: &Path) -> Result<Stack, StackError> {
     let Some(planes) = of_files.map_err(|reason| StackError::Planes { path: path.into(), reason })? else {
         return Ok(Stack { remarks, images, ..Stack::default() });
     };
+    let (object_pixel_um, of_pixel) = positions::object_pixel_um(&pages);
     Ok(Stack {
         images: planes.pages.into_iter().map(|index| images[index].clone()).collect(),
         positions_um: planes.positions_um,
-        object_pixel_um: positions::object_pixel_um(&pages),
-        remarks: [remarks, planes.remarks].concat(),
+        object_pixel_um,
+        remarks: [remarks, planes.remarks, Vec::from_iter(of_pixel)].concat(),
     })
 }
 
@@ -84,7 +86,7 @@ fn file(path: &Path) -> Result<Stack, StackError> {
     let Some(Pages { pages, .. }) = Pages::open(path)? else {
         return Ok(Stack { images: vec![path.into()], ..Stack::default() });
     };
-    let positions::Planes { pages: order, positions_um, remarks } =
+    let positions::Planes { pages: order, positions_um, mut remarks } =
         positions::of(&pages).map_err(|reason| StackError::Planes { path: path.into(), reason })?;
     let page = |index: usize| {
         let mut page = path.as_os_str().to_owned();
@@ -92,10 +94,13 @@ fn file(path: &Path) -> Result<Stack, StackError> {
         PathBuf::from(page)
     };
     let images = order.into_iter().map(page).collect();
-    Ok(Stack { images, positions_um, object_pixel_um: positions::object_pixel_um(&pages), remarks })
+    let (object_pixel_um, of_pixel) = positions::object_pixel_um(&pages);
+    remarks.extend(of_pixel);
+    Ok(Stack { images, positions_um, object_pixel_um, remarks })
 }
 
-/// Reads the images in order, one at a time; `each` takes each with its index and may stop. Two equal images are an error.
+/// Reads the images in order, one at a time; `each` takes each with its index and may stop. Two equal images are an error, unless
+/// they are empty: all pixels alike.
 pub fn read<E: From<StackError>>(
     images: &[PathBuf],
     settings: &ReadSettings,
@@ -106,12 +111,14 @@ pub fn read<E: From<StackError>>(
     for (index, path) in images.iter().enumerate() {
         let image = match page(path, &mut open).map_err(StackError::from)? {
             Some(decoded) => {
-                decoded.grey(settings).map_err(|reason| ImageError::Format { path: path.clone(), reason })
+                decoded.grey(settings).map_err(|reason| ImageError::Setting { path: path.clone(), reason })
             }
             None => image_file::read_grey_with(path, settings),
         };
         let image = image.map_err(StackError::from)?;
-        if let Some(twin) = seen.insert(hash(&image.pixels), index) {
+        let first = image.pixels.first().map(|value| value.to_bits());
+        let is_empty = image.pixels.iter().all(|value| Some(value.to_bits()) == first);
+        if let Some(twin) = seen.insert(hash(&image.pixels), index).filter(|_| !is_empty) {
             return Err(StackError::Twice { first: images[twin].clone(), second: path.clone() }.into());
         }
         each(index, image)?;
@@ -159,5 +166,26 @@ mod tests {
         })
         .unwrap();
         assert_eq!(levels, [0.2]);
+    }
+
+    #[test]
+    fn images_may_be_empty_twice_and_other_images_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |number: usize| folder.path().join(format!("{number}.tif"));
+        let read = |images: [[u16; 3]; 3]| {
+            for (number, pixels) in images.iter().enumerate() {
+                let bytes = encode_tiff(Array2::from_shape_fn((2, 3), |(_, x)| pixels[x]).view(), 8).unwrap();
+                fs::write(path(number), bytes).unwrap();
+            }
+            let mut count = 0;
+            let each = |_, _| -> Result<(), StackError> {
+                count += 1;
+                Ok(())
+            };
+            super::read(&[0, 1, 2].map(path), &ReadSettings::default(), each).map(|()| count)
+        };
+        assert_eq!(read([[7, 7, 7], [1, 2, 3], [7, 7, 7]]).unwrap(), 3);
+        let error = read([[7, 7, 8], [1, 2, 3], [7, 7, 8]]).unwrap_err().to_string();
+        assert!(error.contains("0.tif and ") && error.contains("the same image"), "{error}");
     }
 }

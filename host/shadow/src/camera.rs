@@ -126,11 +126,11 @@ impl CameraFile {
                 Err(CameraError::Range { name, value, expected })
             }
         };
-        within("camera.height_m", c.height_m, 0.0, 1000.0, "above 0 and below 1000 m")?;
+        within("camera.height_m", c.height_m, 0.0, 100.0, "above 0 and below 100 m")?;
         within("camera.azimuth_deg", c.azimuth_deg, -720.5, 720.5, "an angle in degrees")?;
         within("camera.pitch_deg", c.pitch_deg, -80.0, 80.0, "between -80 and 80 deg (downwards positive)")?;
-        within("camera.focal_length_mm", c.focal_length_mm, 0.0, 1e4, "a focal length in mm")?;
-        within("camera.pixel_um", c.pixel_um, 0.0, 1e3, "a pixel pitch in um")?;
+        within("camera.focal_length_mm", c.focal_length_mm, 0.1, 2e3, "a focal length of 0.1 to 2000 mm")?;
+        within("camera.pixel_um", c.pixel_um, 0.1, 1e3, "a pixel pitch of 0.1 to 1000 um")?;
         within("camera.width_px", c.width_px as f64, 0.0, 1e5, "an image width in pixels")?;
         within("camera.height_px", c.height_px as f64, 0.0, 1e5, "an image height in pixels")?;
         within("subject.height_m", self.subject.height_m, 0.2, 3.0, "a stature in metres")?;
@@ -227,6 +227,14 @@ mod tests {
         assert!(bad.to_string().contains("camera.height_m = -0.8"), "{bad}");
         assert!(CameraFile::parse(&format!("{TEXT}hight = 3\n")).is_err());
         assert!(CameraFile::parse(&TEXT.replace("4.0", "nan")).is_err());
+        for (right, wrong, key) in [
+            ("height_m = 0.8", "height_m = 800", "camera.height_m = 800"),
+            ("pixel_um = 6.0", "pixel_um = 0.006", "camera.pixel_um = 0.006"),
+            ("focal_length_mm = 4.0", "focal_length_mm = 0.004", "camera.focal_length_mm = 0.004"),
+        ] {
+            let error = CameraFile::parse(&TEXT.replace(right, wrong)).expect_err("another unit").to_string();
+            assert!(error.contains(key), "{error}");
+        }
     }
 
     #[test]

@@ -46,7 +46,7 @@ use crate::{
     error::{Result, WorkflowError},
     figures::rounded,
     parameters::{THREADS, within},
-    request::{PathKind, Task},
+    request::{PathKind, Task, outputs::check_folder},
 };
 
 const WARNINGS_MAX: usize = 20;
@@ -186,6 +186,7 @@ pub fn run(
     let table = summary_file(settings);
     if let Some(path) = &table {
         outs.check_report("summary", path, Summary::begins)?;
+        check_folder("summary", path)?;
         if are_same(path, &failures)? {
             let reason = "the failures are written there".into();
             return Err(BatchError::Report { what: "summary", path: path.clone(), reason }.into());

@@ -23,7 +23,11 @@ const DARK: &str = "dark.npy";
 const RESPONSE: &str = "response.npy";
 const BAD: &str = "bad.png";
 /// Least brightness of a flat frame relative to the brightest.
-const DARKEST: f32 = 0.5;
+const DARKEST: f64 = 0.5;
+/// Largest distance of a dark frame's mean from the usual one, relative to the flat frames' mean.
+const UNLIKE: f64 = 0.05;
+/// Part of full scale below which light is weak.
+const WEAK: f64 = 0.1;
 
 /// Learn a camera's dark frame, the response of its pixels and its bad ones, for `farnear depth --camera-frames`.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, JsonSchema)]
@@ -70,27 +74,27 @@ pub struct CameraFigures {
 }
 
 pub fn calibrate(settings: &CalibrateCameraRequest, context: &Context<'_>) -> Result<CameraFigures> {
-    let read = |files: &[PathBuf], kind| -> Result<Vec<Array2<f32>>> {
-        let mut exposures = Vec::with_capacity(files.len());
-        for (index, file) in files.iter().enumerate() {
-            context.cancel.check("reading the exposures")?;
-            let image = read_grey(file)?;
-            let holes = image.pixels.iter().filter(|value| !value.is_finite()).count();
-            if holes > 0 {
-                let expected =
-                    format!("expected a value in each pixel, but {holes} have none (NaN or transparent)");
-                return Err(WorkflowError::parameter(kind, file.display(), expected));
-            }
-            if let Some(white) = image.white_level {
-                check_saturation(kind, index + 1, &image.pixels, white)?;
-            }
-            exposures.push(image.pixels);
-        }
-        Ok(exposures)
-    };
-    let (dark, flat) = (read(&settings.dark, "dark")?, read(&settings.flat, "flat")?);
-    check_flats(&flat, &settings.flat)?;
-    let frames = CameraFrames::learn(&dark, &flat)?;
+    let flat = Exposures::read("flat", &settings.flat, context)?;
+    let dark = Exposures::read("dark", &settings.dark, context)?;
+    flat.check(&flat)?;
+    dark.check(&flat)?;
+    let brightest = flat.means.iter().copied().fold(0.0, f64::max);
+    flat.check_means(
+        "brightest",
+        brightest,
+        DARKEST * brightest,
+        "one exposure; a dark frame belongs to --dark",
+    )?;
+    let mut of_dark = dark.means.clone();
+    of_dark.sort_by(f64::total_cmp);
+    // The darker of two.
+    if let Some(usual) = of_dark.get(of_dark.len().saturating_sub(1) / 2) {
+        let most = UNLIKE * flat.mean();
+        let advice = "one exposure and the lens covered; a flat frame belongs to --flat";
+        dark.check_means("usual", *usual, most, advice)?;
+    }
+    doubts(&flat, &dark).iter().for_each(|doubt| context.progress.warn(doubt));
+    let frames = CameraFrames::learn(&dark.images, &flat.images)?;
     let staged = Staging::into_folder(&settings.out)?;
     staged.write(DARK, &npy::write(frames.dark()))?;
     staged.write(RESPONSE, &npy::write(frames.response()))?;
@@ -109,30 +113,112 @@ pub fn calibrate(settings: &CalibrateCameraRequest, context: &Context<'_>) -> Re
     })
 }
 
-/// Fails if two flat frames are one image, or one is much darker than the brightest.
-fn check_flats(flats: &[Array2<f32>], files: &[PathBuf]) -> Result<()> {
-    let refused = |index: usize, expected: String| {
-        Err(WorkflowError::parameter("flat", files[index].display(), expected))
-    };
-    let means: Vec<f32> = flats.iter().map(|flat| flat.mean().unwrap_or(0.0)).collect();
-    let brightest = means.iter().copied().fold(0.0, f32::max);
-    for (index, flat) in flats.iter().enumerate() {
-        if let Some(same) = flats[..index].iter().position(|other| other == flat) {
-            let same = files[same].display();
-            return refused(index, format!("it is the same image as {same}, and adds nothing: leave it out"));
+/// Exposures of one kind, with their means.
+struct Exposures<'a> {
+    kind: &'static str,
+    files: &'a [PathBuf],
+    images: Vec<Array2<f32>>,
+    means: Vec<f64>,
+    /// Variance of a pixel by lossy compression.
+    coding: Vec<f64>,
+}
+
+impl<'a> Exposures<'a> {
+    /// Fails for an exposure with pixels without a value, or saturated ones.
+    fn read(kind: &'static str, files: &'a [PathBuf], context: &Context<'_>) -> Result<Self> {
+        let mut found = Self { kind, files, images: Vec::new(), means: Vec::new(), coding: Vec::new() };
+        for (index, file) in files.iter().enumerate() {
+            context.cancel.check("reading the exposures")?;
+            let image = read_grey(file)?;
+            let holes = image.pixels.iter().filter(|value| !value.is_finite()).count();
+            if holes > 0 {
+                let expected =
+                    format!("expected a value in each pixel, but {holes} have none (NaN or transparent)");
+                return found.refused(index, expected);
+            }
+            if let Some(white) = image.white_level {
+                check_saturation(kind, index + 1, &image.pixels, white)?;
+            }
+            found.means.push(mean(image.pixels.iter().map(|value| f64::from(*value))));
+            found.coding.push(image.coding_variance);
+            found.images.push(image.pixels);
         }
-        let mean = means[index];
-        if mean < DARKEST * brightest {
-            return refused(
-                index,
-                format!(
-                    "its mean is {mean:.3} of full scale, the brightest flat frame has {brightest:.3}: all need one exposure; \
-                     a dark frame belongs to --dark"
-                ),
-            );
-        }
+        Ok(found)
     }
-    Ok(())
+
+    fn refused<T>(&self, index: usize, expected: String) -> Result<T> {
+        Err(WorkflowError::parameter(self.kind, self.files[index].display(), expected))
+    }
+
+    fn mean(&self) -> f64 {
+        mean(self.means.iter().copied())
+    }
+
+    /// Fails if one has another size than the first flat frame, or if two are one image; only black frames may be.
+    fn check(&self, flat: &Self) -> Result<()> {
+        let Some((first, file)) = flat.images.first().zip(flat.files.first()) else { return Ok(()) };
+        let (rows, columns) = first.dim();
+        for (index, image) in self.images.iter().enumerate() {
+            let (height, width) = image.dim();
+            if (height, width) != (rows, columns) {
+                let first = file.display();
+                let expected = format!(
+                    "it has {width}x{height} pixels, and {first} {columns}x{rows}: take all in the camera's mode of the images"
+                );
+                return self.refused(index, expected);
+            }
+            let same = self.images[..index].iter().position(|other| other == image);
+            if let Some(same) = same.filter(|_| image.iter().any(|value| *value != 0.0)) {
+                let same = self.files[same].display();
+                let expected = format!("it is the same image as {same}, and adds nothing: leave it out");
+                return self.refused(index, expected);
+            }
+        }
+        Ok(())
+    }
+
+    /// Fails if a mean is farther than `most` from the `usual` one.
+    fn check_means(&self, which: &str, usual: f64, most: f64, advice: &str) -> Result<()> {
+        let off = |index: &usize| (self.means[*index] - usual).abs();
+        let farthest = (0..self.means.len()).max_by(|a, b| off(a).total_cmp(&off(b)));
+        let Some(index) = farthest.filter(|index| off(index) > most) else { return Ok(()) };
+        let (kind, mean) = (self.kind, self.means[index]);
+        let expected = format!(
+            "its mean is {mean:.3} of full scale, the {which} {kind} frame has {usual:.3}: all need {advice}"
+        );
+        self.refused(index, expected)
+    }
+}
+
+/// 0 without values.
+fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len().max(1) as f64;
+    values.sum::<f64>() / count
+}
+
+/// Warnings of light that is too weak, and of lossy compression.
+fn doubts(flat: &Exposures<'_>, dark: &Exposures<'_>) -> Vec<String> {
+    let mut found = Vec::new();
+    let light = flat.mean() - dark.mean();
+    if light < WEAK {
+        found.push(format!(
+            "the flat frames are {:.1} % of full scale above black: noise and rounding then hide the response of the pixels; expose to \
+             about half of full scale (unless the camera uses only the lower of the files' bits)",
+            100.0 * light
+        ));
+    }
+    let files = [flat, dark].into_iter().flat_map(|of| of.coding.iter().zip(of.files));
+    let compressed: Vec<_> = files.filter(|(variance, _)| **variance > 0.0).collect();
+    if let Some((variance, file)) = compressed.iter().max_by(|a, b| a.0.total_cmp(b.0)) {
+        found.push(format!(
+            "lossy compression (JPEG) removes detail of the pixels' response, {:.1} % of the flat frames' mean in {} (compressed frames: \
+             {}): save PNG or TIFF",
+            100.0 * variance.sqrt() / flat.mean(),
+            file.display(),
+            compressed.len()
+        ));
+    }
+    found
 }
 
 pub fn read(folder: &Path) -> Result<CameraFrames> {
@@ -144,4 +230,112 @@ pub fn read(folder: &Path) -> Result<CameraFrames> {
     let response = map::read(&folder.join(RESPONSE))?;
     let bad = map::read_mask(&folder.join(BAD))?;
     Ok(CameraFrames::new(dark, response, bad)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use super::*;
+    use crate::context::{Cancel, Progress, Unattended};
+
+    #[derive(Default)]
+    struct Heard(Mutex<Vec<String>>);
+
+    impl Progress for Heard {
+        fn info(&self, _: &str) {}
+        fn warn(&self, what: &str) {
+            self.0.lock().unwrap().push(what.into());
+        }
+    }
+
+    struct Bench(tempfile::TempDir);
+
+    impl Bench {
+        fn path(&self, name: &str) -> PathBuf {
+            self.0.path().join(name)
+        }
+
+        /// An even exposure of (height, width) with noise, as PNG of 16 bits.
+        fn exposure(&self, name: &str, (height, width): (usize, usize), [mean, noise]: [f64; 2]) -> PathBuf {
+            let seed = name.bytes().fold(7_u32, |seed, byte| seed.wrapping_mul(31).wrapping_add(byte.into()));
+            let codes = Array2::from_shape_fn((height, width), |(y, x)| {
+                let mut hash = seed ^ (y * 7919 + x * 104_729) as u32;
+                hash = (hash ^ (hash >> 15)).wrapping_mul(0x2c1b_3c6d);
+                let value = f64::from(hash ^ (hash >> 13)) / f64::from(u32::MAX) - 0.5;
+                (65535.0 * (mean + noise * value)) as u16
+            });
+            let path = self.path(name);
+            std::fs::write(&path, encode_png(codes.view(), 16).unwrap()).unwrap();
+            path
+        }
+
+        fn flat(&self, name: &str) -> PathBuf {
+            self.exposure(name, SIZE, [0.5, 0.02])
+        }
+
+        fn dark(&self, name: &str) -> PathBuf {
+            self.exposure(name, SIZE, [0.01, 0.004])
+        }
+
+        /// The warnings.
+        fn calibrate(&self, flat: &[&PathBuf], dark: &[&PathBuf]) -> Result<Vec<String>> {
+            let [flat, dark] = [flat, dark].map(|files| files.iter().copied().cloned().collect());
+            let heard = Heard::default();
+            let context = Context::new(&heard, &Unattended, Cancel::default());
+            calibrate(&CalibrateCameraRequest { flat, dark, out: self.path("out") }, &context)?;
+            let said = heard.0.lock().unwrap().clone();
+            Ok(said)
+        }
+
+        fn refused(&self, flat: &[&PathBuf], dark: &[&PathBuf], phrases: [&str; 3]) {
+            let error = self.calibrate(flat, dark).unwrap_err();
+            assert!(error.is_usage(), "{error}");
+            for phrase in phrases {
+                assert!(error.to_string().contains(phrase), "{phrase:?}: {error}");
+            }
+        }
+    }
+
+    const SIZE: (usize, usize) = (60, 80);
+
+    #[test]
+    fn an_exposure_that_differs_from_the_others_is_refused_by_name() {
+        let bench = Bench(tempfile::tempdir().unwrap());
+        let [a, b, c] = ["a.png", "b.png", "c.png"].map(|name| bench.flat(name));
+        let [d, e, f] = ["d.png", "e.png", "f.png"].map(|name| bench.dark(name));
+        assert_eq!(bench.calibrate(&[&a, &b], &[&d, &e, &f]).unwrap(), [""; 0]);
+        bench.refused(&[&a, &b], &[&d, &c, &e, &f], ["dark", "c.png: its mean is 0.500", "--flat"]);
+        bench.refused(&[&a, &b], &[&d, &c], ["dark", "c.png: its mean is 0.500", "dark frame has 0.010"]);
+        bench.refused(&[&a, &d, &b], &[], ["flat", "d.png: its mean is 0.010", "--dark"]);
+        bench.refused(&[&a, &b], &[&d, &e, &d], ["dark", "d.png", "the same image"]);
+        bench.refused(&[&a, &a], &[&d], ["flat", "a.png", "the same image"]);
+        let small = bench.exposure("small.png", (30, 80), [0.5, 0.02]);
+        bench.refused(&[&a, &small], &[&d], ["flat", "small.png: it has 80x30 pixels", "a.png 80x60"]);
+        bench.refused(&[&a, &b], &[&d, &small], ["dark", "small.png: it has 80x30 pixels", "a.png 80x60"]);
+    }
+
+    #[test]
+    fn a_camera_that_clips_at_black_has_equal_dark_frames() {
+        let bench = Bench(tempfile::tempdir().unwrap());
+        let [black, again] = ["d.png", "e.png"].map(|name| bench.exposure(name, SIZE, [0.0, 0.0]));
+        assert_eq!(bench.calibrate(&[&bench.flat("a.png")], &[&black, &again]).unwrap(), [""; 0]);
+    }
+
+    #[test]
+    fn weak_light_and_lossy_compression_are_told_with_their_size() {
+        let bench = Bench(tempfile::tempdir().unwrap());
+        let dark = bench.dark("d.png");
+        let weak = bench.exposure("weak.png", SIZE, [0.03, 0.002]);
+        let [said] = &bench.calibrate(&[&weak], &[&dark]).unwrap()[..] else { panic!("one warning") };
+        assert!(said.contains("2.0 % of full scale above black"), "{said}");
+        let flat = bench.exposure("a.png", SIZE, [0.5, 0.1]);
+        let jpeg = bench.path("a.jpg");
+        image::open(&flat).unwrap().into_luma8().save(&jpeg).unwrap();
+        let [said] = &bench.calibrate(&[&jpeg], &[&dark]).unwrap()[..] else { panic!("one warning") };
+        assert!(
+            said.contains("compression (JPEG)") && said.contains("a.jpg (compressed frames: 1)"),
+            "{said}"
+        );
+    }
 }

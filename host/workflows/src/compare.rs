@@ -3,15 +3,14 @@
 use std::path::PathBuf;
 
 use farnear_depth::metrics::{self, CompareSettings, Comparison};
-use farnear_files::{map, quantiles::Quantiles};
-use ndarray::Array2;
+use farnear_files::map;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, Serializer};
 
 use crate::{
     context::Context,
     error::Result,
-    measure::{Entries, Unit, read_map, shared_unit},
+    measure::{Entries, Unit, read_two},
     request::{PathKind, Request},
 };
 
@@ -80,29 +79,9 @@ impl Serialize for ComparisonFigures {
     }
 }
 
-/// Ratio of depths that differ by metres and millimetres, or by millimetres and micrometres.
-const OTHER_UNIT: std::ops::RangeInclusive<f32> = 500.0..=2000.0;
-
-fn of_other_unit(depth: &Array2<f32>, truth: &Array2<f32>) -> Option<String> {
-    let median = |map: &Array2<f32>| {
-        let quantiles = Quantiles::new(map.view());
-        quantiles.at(quantiles.finite() / 2)
-    };
-    let (depth, truth) = (median(depth)?, median(truth)?);
-    let ratio = depth.max(truth) / depth.min(truth);
-    OTHER_UNIT.contains(&ratio).then(|| {
-        format!("the median of the map is {depth}, that of the true depth {truth}: is one of them in another unit?")
-    })
-}
-
 /// Fails for maps in different units.
 pub fn compare(request: &CompareRequest, context: &Context<'_>) -> Result<ComparisonFigures> {
-    let (depth, truth) = (read_map(&request.depth)?, read_map(&request.truth)?);
-    let unit = shared_unit("truth", &depth, &truth)?;
-    let mut remarks = Vec::new();
-    let [mut depth, mut truth] = [depth, truth].map(|map| map.depth(unit, &mut remarks));
-    remarks.extend(of_other_unit(&depth, &truth));
-    remarks.iter().for_each(|remark| context.progress.warn(remark));
+    let ([mut depth, mut truth], unit) = read_two("truth", [&request.depth, &request.truth], context)?;
     if unit == Unit::Um {
         // Positions may have any sign; a common offset above 0 keeps the errors.
         let lowest = depth.iter().chain(&truth).copied().fold(0.0, f32::min);

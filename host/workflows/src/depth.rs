@@ -30,12 +30,10 @@ use crate::{
     error::{About, Result, WorkflowError},
     figures::{rounded, rounded_for},
     optics::{self, OpticsDoubt},
+    quantile,
     request::Request,
 };
-use farnear_files::{
-    image_file::{ReadSettings, Samples},
-    quantiles::Quantiles,
-};
+use farnear_files::image_file::{ReadSettings, Samples};
 use method::Prepared;
 use noise::Uncertainty;
 use output::Results;
@@ -86,11 +84,12 @@ fn compute_here(settings: &DepthRequest, context: &Context<'_>) -> Result<DepthF
     context.info(&format!("wrote {}", out.display()));
     let (height, width) = computed.map.depth_mm.dim();
     let range = inputs.optics.working_range();
+    let median_mm = quantile::of_map(computed.map.depth_mm.view(), 0.5).unwrap_or(f64::NAN);
     Ok(DepthFigures {
         seconds: rounded(seconds, 6),
         width,
         height,
-        median_mm: rounded_for(range.far_mm - range.near_mm, median(&computed.map.depth_mm), 3),
+        median_mm: rounded_for(range.far_mm - range.near_mm, median_mm, 3),
         low_texture_fraction: rounded(computed.map.low_texture_fraction, 6),
         valid_fraction: rounded(computed.map.valid_fraction(), 6),
         uncertainty: computed.deviation.map(|(_, found)| found),
@@ -269,12 +268,6 @@ fn correct(depth: &mut DepthMap, reasons: &mut Array2<u8>, correction: &Correcti
         }
     }
     Ok(())
-}
-
-/// NaN if no pixel has a value.
-fn median(map: &Array2<f32>) -> f64 {
-    let quantiles = Quantiles::new(map.view());
-    quantiles.at(quantiles.finite() / 2).map_or(f64::NAN, f64::from)
 }
 
 #[cfg(test)]

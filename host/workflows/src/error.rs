@@ -175,6 +175,7 @@ impl From<PrepareError> for WorkflowError {
         match error {
             PrepareError::Pair(error) => Self::Depth(error),
             PrepareError::Camera(error) => error.into(),
+            PrepareError::Optics(error) => error.into(),
             error @ PrepareError::Unrelated { .. } => Self::Library(Box::new(error)),
         }
     }

@@ -37,6 +37,7 @@ use crate::{
     error::{Result, WorkflowError},
     figures::{rounded, rounded_for},
     inputs::{HashedFile, hashed},
+    quantile,
     request::{PathKind, Request},
     result_folder::{self, STACK_RECORD},
 };
@@ -388,13 +389,10 @@ fn figures(
     left_out: Vec<String>,
     mut warnings: Vec<String>,
 ) -> FocusStackFigures {
-    let mut values: Vec<f32> = depth.iter().copied().filter(|v| v.is_finite()).collect();
-    let middle = values.len() / 2;
+    let values: Vec<f32> = depth.iter().copied().filter(|v| v.is_finite()).collect();
     let [least, most] = [f32::min, f32::max].map(|of| values.iter().copied().reduce(of).unwrap_or_default());
-    let median = (!values.is_empty()).then(|| {
-        let median = *values.select_nth_unstable_by(middle, f32::total_cmp).1;
-        rounded_for(f64::from(most - least), f64::from(median), 3)
-    });
+    let median = quantile::of_map(depth.view(), 0.5);
+    let median = median.map(|median| rounded_for(f64::from(most - least), median, 3));
     let known = values.len() as f64 / depth.len().max(1) as f64;
     let ends = map.reliability.iter().filter(|r| **r == 0.0).count() as f64 / depth.len().max(1) as f64;
     if known < LITTLE {

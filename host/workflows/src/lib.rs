@@ -66,6 +66,7 @@ mod parameters;
 pub mod picture;
 pub mod plot;
 pub mod psf;
+mod quantile;
 pub mod report;
 pub mod request;
 pub mod result_folder;

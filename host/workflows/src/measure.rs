@@ -19,7 +19,7 @@ use farnear_files::mesh::{Lateral, Projection};
 use ndarray::{Array2, Array3, ArrayView2, s};
 use serde::{Deserialize, Serialize};
 
-pub(crate) use difference::shared_unit;
+pub(crate) use difference::read_two;
 pub use difference::{DifferenceFigures, difference};
 pub(crate) use map_file::{MapFile, read_map};
 pub use mesh::mesh;

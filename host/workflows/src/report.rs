@@ -20,6 +20,7 @@ use crate::{
     context::Context,
     error::{Result, WorkflowError},
     measure::{Measured, region},
+    quantile,
     request::{PathKind, Request},
     result_folder::{DEPTH_RECORD, STACK_RECORD},
 };
@@ -93,9 +94,9 @@ fn depth(page: &mut Page, folder: &Path) -> Result<()> {
     match std::fs::read(folder.join("view.png")) {
         Ok(bytes) => page.picture(&bytes, &format!("depth in {unit}; pale where confidence is low")),
         Err(_) => {
-            let ends = [0.005, 0.995].map(|part| pictures::quantile(measured.depth.view(), part));
+            let ends = [0.005, 0.995].map(|part| quantile::of_map(measured.depth.view(), part));
             if let [Some(low), Some(high)] = ends {
-                let decimals = decimals(f64::from(high - low), 2);
+                let decimals = decimals(high - low, 2);
                 let caption = format!("depth, dark = {low:.decimals$} to bright = {high:.decimals$} {unit}");
                 page.picture(&colours(measured.depth.view(), [low, high])?, &caption);
             }
@@ -105,8 +106,8 @@ fn depth(page: &mut Page, folder: &Path) -> Result<()> {
         page.picture(&colours(confidence.view(), [0.0, 1.0])?, "confidence, dark = 0 to bright = 1");
     }
     if let Some(deviation) = &measured.deviation {
-        let largest = pictures::quantile(deviation.view(), 0.98).unwrap_or(1.0);
-        let decimals = decimals(f64::from(largest), 2);
+        let largest = quantile::of_map(deviation.view(), 0.98).unwrap_or(1.0);
+        let decimals = decimals(largest, 2);
         let caption = format!("standard deviation, dark = 0 to bright = {largest:.decimals$} {unit}");
         page.picture(&colours(deviation.view(), [0.0, largest])?, &caption);
     }

@@ -22,6 +22,11 @@ pub const STACK_RECORD: &str = "stack.toml";
 pub(crate) const STACK_FILES: [&str; 5] =
     ["depth.npy", "confidence.npy", "all-in-focus.png", "view.png", STACK_RECORD];
 
+/// Files of depth maps and focus stacks.
+pub(crate) fn files() -> impl Iterator<Item = &'static str> {
+    output::files().chain(STACK_FILES)
+}
+
 fn is_ours(record: &Path) -> bool {
     let table = fs::read_to_string(record).ok().and_then(|text| text.parse::<toml::Table>().ok());
     let made_by = table.as_ref().and_then(|table| table.get("made_by")?.as_str());

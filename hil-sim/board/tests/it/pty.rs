@@ -326,6 +326,22 @@ fn a_missing_firmware_names_the_command_that_builds_it() {
 }
 
 #[test]
+fn refuses_an_output_in_a_missing_folder_before_it_starts_and_names_the_cause_once() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for option in ["--memory", "--trace"] {
+        let output = Command::new(env!("CARGO_BIN_EXE_farnear-sim"))
+            .args(["run", option])
+            .arg(folder.path().join("absent/file"))
+            .stdin(Stdio::piped()) // closed: a rig that starts ends
+            .output()
+            .expect("starts");
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success() && output.stdout.is_empty(), "{option}: {message}");
+        assert!(message.contains("absent") && message.matches("os error").count() == 1, "{message}");
+    }
+}
+
+#[test]
 fn refuses_a_file_that_is_not_firmware() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let elf = folder.path().join("no.elf");

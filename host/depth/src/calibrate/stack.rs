@@ -111,11 +111,11 @@ pub enum StackError {
     )]
     NoFocus { blocks: usize, of: usize },
     #[error(
-        "no pair of slices has a largest blur of {low} to {high} px: it is {per_slice:.2} px per slice{given}; use a {hint}",
+        "no pair of slices has a largest blur of {low} to {high} px: it is {per_slice:.2} px per slice{given}; use {hint}",
         low = USABLE_PX[0],
         high = USABLE_PX[1]
     )]
-    NoSeparation { per_slice: f64, given: String, hint: &'static str },
+    NoSeparation { per_slice: f64, given: String, hint: String },
     #[error("no pair of slices {0} apart has its target within the range: take more slices around the focus")]
     NoPair(usize),
     #[error(
@@ -259,26 +259,38 @@ fn separation(
     let most = (slices - 1) / 2;
     let steps = settings.pair_step.map_or((1..=most.max(1)).collect(), |step| vec![step]);
     let forced = settings.bin.is_some() && settings.pair_step.is_some();
+    let radius_px = |bin: usize, step: usize| per_slice * step as f64 / bin as f64;
+    let is_usable = |bin: usize, step: usize| (USABLE_PX[0]..=USABLE_PX[1]).contains(&radius_px(bin, step));
     bins.iter()
         .flat_map(|bin| steps.iter().map(move |step| (*bin, *step)))
-        .map(|(bin, step)| (bin, step, per_slice * step as f64 / bin as f64))
-        .filter(|(_, _, radius)| forced || (USABLE_PX[0]..=USABLE_PX[1]).contains(radius))
+        .filter(|(bin, step)| forced || is_usable(*bin, *step))
         .min_by(|a, b| {
-            let cost = |(bin, step, radius): &(usize, usize, f64)| {
+            let cost = |(bin, step): &(usize, usize)| {
                 let missing = ENOUGH_DEPTHS.saturating_sub(*step) as f64;
-                (radius - AIM_PX).abs() + 0.3 * (*bin as f64).log2() + 0.5 * missing
+                (radius_px(*bin, *step) - AIM_PX).abs() + 0.3 * (*bin as f64).log2() + 0.5 * missing
             };
             cost(a).total_cmp(&cost(b))
         })
-        .map(|(bin, step, _)| (bin, step))
         .ok_or_else(|| {
             let named =
                 |name: &str, value: Option<usize>| value.map(|value| format!(" with {name} = {value}"));
             let given = [named("bin", settings.bin), named("pair_step", settings.pair_step)];
-            let hint = match (settings.bin, settings.pair_step) {
-                (None, None) if per_slice > 1.0 => "finer step of the stage",
-                (None, None) => "coarser step of the stage or more slices",
-                _ => "other value, or leave it out",
+            let (name, usable): (_, Vec<usize>) = match (settings.bin, settings.pair_step) {
+                (None, None) => ("", Vec::new()),
+                (None, Some(_)) => {
+                    let is_usable = |step: &usize| BINS.iter().any(|bin| is_usable(*bin, *step));
+                    ("pair_step", (1..=slices - 2).filter(is_usable).collect())
+                }
+                (Some(_), _) => {
+                    let is_usable = |bin: &usize| (1..=most).any(|step| is_usable(*bin, step));
+                    ("bin", (1..=Stage::LARGEST_BIN).filter(is_usable).collect())
+                }
+            };
+            let hint = match usable[..] {
+                [one] => format!("{name} = {one}, or leave it out"),
+                [least, .., most] => format!("{name} = {least} to {most}, or leave it out"),
+                [] if per_slice > 1.0 => "a finer step of the stage".into(),
+                [] => "a coarser step of the stage or more slices".into(),
             };
             StackError::NoSeparation { per_slice, given: given.into_iter().flatten().collect(), hint }
         })
@@ -345,6 +357,29 @@ mod tests {
         let settings = StackSettings { step_mm: 0.5, moved, pair_step: None, bin: None, coding: 0.0 };
         let error = check(&slices, &settings).unwrap_err().to_string();
         assert!(error.contains("slice 4 has 90x80 px and the first one 96x80"), "{error}");
+    }
+
+    #[test]
+    fn an_unusable_pair_step_or_bin_is_refused_with_the_usable_ones() {
+        let moved = Moved::Target { object_pixel_um: None, far_mm: None };
+        let usual = StackSettings { step_mm: 0.5, moved, pair_step: None, bin: None, coding: 0.0 };
+        for (per_slice, given, phrase) in [
+            (
+                0.25,
+                StackSettings { pair_step: Some(6), ..usual.clone() },
+                "use pair_step = 7 to 19, or leave",
+            ),
+            (0.25, StackSettings { bin: Some(3), ..usual.clone() }, "use bin = 1, or leave it out"),
+            (4.0, StackSettings { bin: Some(1), ..usual.clone() }, "use bin = 2 to 25, or leave it out"),
+            (0.1, StackSettings { pair_step: Some(6), ..usual.clone() }, "use pair_step = 16 to 19, or"),
+            (0.01, usual.clone(), "use a coarser step of the stage or more slices"),
+            (0.01, StackSettings { bin: Some(1), ..usual.clone() }, "use a coarser step of the stage"),
+            (99.0, usual.clone(), "use a finer step of the stage"),
+        ] {
+            let blur = BlurCurve { points: Vec::new(), per_slice_px: [per_slice; 2] };
+            let error = separation(&blur, 21, &given).unwrap_err().to_string();
+            assert!(error.contains(phrase), "{error}");
+        }
     }
 
     #[test]

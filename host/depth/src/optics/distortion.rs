@@ -59,6 +59,15 @@ impl Distortion {
         Self { focal_px, centre_px, ..self }
     }
 
+    /// Checks that the centre lies inside images of this size (height, width).
+    pub(crate) fn check_centre(&self, (height, width): (usize, usize)) -> Result<(), OpticsError> {
+        let [cx, cy] = self.centre_px;
+        if (0.0..=width as f64).contains(&cx) && (0.0..=height as f64).contains(&cy) {
+            return Ok(());
+        }
+        Err(OpticsError::DistortionCentre { cx, cy, width, height })
+    }
+
     /// Sensor position of the pinhole's pixel `[u, v]`.
     pub fn distorted(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let [[fx, fy], [cx, cy]] = [self.focal_px, self.centre_px];

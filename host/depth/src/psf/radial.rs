@@ -58,11 +58,13 @@ impl RadialPsf {
     }
 
     /// The profile of an image of the PSF or aperture, black = no light, about its centroid. `radius_px` is the blur
-    /// radius (the aperture's edge) in the image; `None`: half the shorter side. [`PsfError::Profile`] without light.
+    /// radius (the aperture's edge) in the image, at most half the shorter side; `None`: that half. [`PsfError::Profile`] without
+    /// light.
     pub fn from_image(image: ArrayView2<f32>, radius_px: Option<f64>) -> Result<Drawn, PsfError> {
         let (height, width) = image.dim();
-        let radius_px = radius_px.unwrap_or(0.5 * height.min(width) as f64);
-        super::check_range("radius", radius_px, [1.0, 1e5])?;
+        let largest_px = 0.5 * height.min(width) as f64;
+        let radius_px = radius_px.unwrap_or(largest_px);
+        super::check_range("radius", radius_px, [1.0, largest_px])?;
         if let Some(wrong) = image.iter().find(|value| !(value.is_finite() && **value >= 0.0)) {
             return Err(PsfError::Profile(format!("a pixel of {wrong}, expected 0 or more")));
         }
@@ -206,6 +208,19 @@ mod tests {
             assert!((table.at(z) - psf.transform(z)).abs() < 1e-5, "{z}");
         }
         assert!((psf.extent() - 1.55).abs() < 0.05, "{}", psf.extent());
+    }
+
+    #[test]
+    fn a_radius_outside_the_image_is_refused() {
+        let drawn = |radius_px| RadialPsf::from_image(disc(61, 0.5).view(), Some(radius_px));
+        assert!(drawn(30.5).is_ok());
+        for radius_px in [31.0, 200.0, f64::NAN] {
+            let error = drawn(radius_px).unwrap_err().to_string();
+            assert!(
+                error.contains(&format!("radius = {radius_px}, expected a number from 1 to 30.5")),
+                "{error}"
+            );
+        }
     }
 
     #[test]

@@ -9,12 +9,14 @@ const SIZE: (usize, usize) = (160, 200);
 /// Shift of the near image without distortion, px.
 const SHIFT: [f64; 2] = [0.6, -0.4];
 
-fn optics() -> Optics {
-    let text = "[lens]\nfocal_length_mm = 50.0\nf_number = 3.90625\n[sensor]\npixel_um = 7.4\n\
-                [focus]\nfar_mm = 933.0\nmax_blur_px = 2.703\n\
-                [distortion]\ncamera_matrix = [[400.0, 0, 98.5], [0, 402.0, 81.0], [0, 0, 1]]\n\
-                coefficients = [-0.3, 0.1, 0.001, -0.002, 0.0]";
-    toml::from_str::<OpticsFile>(text).unwrap().check().unwrap()
+fn optics(cx: f64) -> Optics {
+    let text = format!(
+        "[lens]\nfocal_length_mm = 50.0\nf_number = 3.90625\n[sensor]\npixel_um = 7.4\n\
+         [focus]\nfar_mm = 933.0\nmax_blur_px = 2.703\n\
+         [distortion]\ncamera_matrix = [[400.0, 0, {cx:?}], [0, 402.0, 81.0], [0, 0, 1]]\n\
+         coefficients = [-0.3, 0.1, 0.001, -0.002, 0.0]"
+    );
+    toml::from_str::<OpticsFile>(&text).unwrap().check().unwrap()
 }
 
 fn scene([x, y]: [f64; 2]) -> f64 {
@@ -37,7 +39,7 @@ fn straight(distortion: &Distortion, pixel: [f64; 2]) -> [f64; 2] {
 
 #[test]
 fn a_distorted_and_shifted_pair_is_straight_and_aligned() {
-    let optics = optics();
+    let optics = optics(98.5);
     let distortion = optics.distortion().unwrap();
     let record = |[dx, dy]: [f64; 2]| {
         Array2::from_shape_fn(SIZE, |(y, x)| {
@@ -60,5 +62,18 @@ fn a_distorted_and_shifted_pair_is_straight_and_aligned() {
         let rms = (squares / middle().count() as f64).sqrt();
         // The texture's own is 0.16. Interpolation and alignment error leave about a hundredth of it.
         assert!(rms < 0.004, "{rms}");
+    }
+}
+
+#[test]
+fn a_centre_outside_the_images_is_refused() {
+    let image = Array2::from_shape_fn(SIZE, |(y, x)| scene([x as f64, y as f64]) as f32);
+    for cx in [985.0, -1.0] {
+        let settings = PrepareSettings::default();
+        let error =
+            prepare(image.view(), image.view(), &optics(cx), None, &settings).unwrap_err().to_string();
+        let centre = format!("cx = {cx}, cy = 81");
+        let phrases = ["[distortion] camera_matrix", centre.as_str(), "200x160 px"];
+        assert!(phrases.iter().all(|phrase| error.contains(phrase)), "{error}");
     }
 }

@@ -8,7 +8,7 @@ use farnear_depth::measure::{
 };
 use farnear_depth::operators::Operators;
 use farnear_depth::optics::Optics;
-use farnear_depth::pipeline::{Settings, depth_from_pair};
+use farnear_depth::pipeline::{RunError, Settings, depth_from_pair};
 use farnear_depth::prepare::{Align, Balance, PrepareError, PrepareSettings};
 use farnear_depth::reason::Reason;
 use farnear_scene::{Camera, Lens, Noise, OpticsFile, Renderer, Scene, View, standard, truth};
@@ -248,6 +248,17 @@ fn different_scenes_are_refused() {
         matches!(refused, MeasureError::Prepare(PrepareError::Unrelated { because: None, .. })),
         "{refused}"
     );
+}
+
+#[test]
+fn an_image_is_no_pair_with_itself() {
+    let mut twice = plain("staircase", 1);
+    // A transparent pixel is alike a transparent one.
+    twice.far[(20, 30)] = f32::NAN;
+    twice.near.assign(&twice.far);
+    assert_eq!(measure(&twice, PSF, Window::Adaptive).unwrap_err(), MeasureError::Run(RunError::SameImage));
+    twice.near[(20, 30)] = 0.5;
+    assert_ne!(measure(&twice, PSF, Window::Adaptive).err(), Some(MeasureError::Run(RunError::SameImage)));
 }
 
 #[test]

@@ -144,7 +144,14 @@ fn an_invalid_camera_is_reported_before_any_motion() {
     for (camera, code, phrases) in [
         ("webcam", 2, vec!["camera webcam", "folder:DIR"]),
         ("folder:/farnear-absent", 1, vec!["/farnear-absent", "No such file"]),
-        ("sim", 2, vec!["camera sim: it belongs to the emulated rig"]),
+        (
+            "sim",
+            2,
+            vec![
+                "camera sim: it belongs to the emulated rig and is the default",
+                "name the camera of /dev/farnear-absent: HOST:PORT, folder:DIR",
+            ],
+        ),
         ("127.0.0.1:1", 1, vec!["127.0.0.1:1", "refused"]),
     ] {
         // The camera is checked first: the absent port would give another message.

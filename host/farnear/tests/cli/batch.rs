@@ -385,6 +385,10 @@ fn a_second_run_repeats_the_figures_of_the_first() {
         first.iter().all(|line| line["state"] == "done" && line["figures"]["valid_fraction"].is_number()),
         "{first:?}"
     );
+    // Found before the jobs, not after them.
+    let nowhere = folder.text("nodir/figures.csv");
+    let refused = ["batch", &manifest, "--summary", &nowhere];
+    fails(&mut farnear(&refused), 2, &["summary", "there is no folder", "nodir"]);
     let table = folder.text("figures.csv");
     let second = run(&["--summary", &table]);
     for (mut first, second) in first.into_iter().zip(&second) {

@@ -6,7 +6,7 @@ use farnear_files::{image_file, map};
 use farnear_scene::wave::{WaveLens, random_texture};
 use ndarray::{Array2, s};
 
-use crate::common::{Folder, fails, farnear, figures, number};
+use crate::common::{Folder, fails, farnear, figures, number, succeeds};
 
 const SIZE: [usize; 2] = [160, 128];
 const SLICES: usize = 13;
@@ -59,6 +59,12 @@ fn two_commands_lead_from_slices_to_depth_of_another_scene() {
     // 0.6 px of blur per slice, and the lens has a floor.
     let pair_step = number(&found, "pair_step") as usize;
     assert!((3..=6).contains(&pair_step), "{found}");
+    // The printed command measures the target, whose middle both images must not show alike.
+    let next = found["next"].as_str().expect("a command");
+    let (_, command) = next.split_once("farnear ").expect("a command");
+    let words: Vec<&str> = command.split_whitespace().collect();
+    let (_, stderr) = succeeds(farnear(&words).args(["--out", &folder.text("next")]));
+    assert!(!stderr.contains("noise alone"), "{next}: {stderr}");
     // Another texture at another distance.
     let focus = 5.0 + 0.6 * pair_step as f64;
     slices(&scene, focus, [5, 5 + pair_step].into_iter(), 4);

@@ -47,6 +47,10 @@ fn unprintable_targets_are_rejected_without_output() {
         fails(farnear(&asked).args(more), 2, &phrases);
     }
     let nowhere = folder.text("none/target.pdf");
-    fails(&mut farnear(&["target", "--optics", rig_optics(), "--out", &nowhere]), 1, &["none/target.pdf"]);
+    fails(
+        &mut farnear(&["target", "--optics", rig_optics(), "--out", &nowhere]),
+        2,
+        &["none/target.pdf", "no folder"],
+    );
     assert!(folder.listing().is_empty(), "{:?}", folder.listing());
 }

@@ -9,43 +9,75 @@ const MICROSCOPE: &str =
     "it is a microscope's file, which is not read: convert it to OME-TIFF (Bio-Formats: bfconvert)";
 const ARRAYS: &str = "it is a file of several arrays: save an image as float TIFF (`tifffile.imwrite`), a map as .npy (`numpy.save`)";
 
-/// Formats that are not read, by their first bytes.
-const OTHERS: [(&[u8], &str); 22] = [
-    (b"GIF8", "GIF is not read: convert it to PNG or TIFF"),
-    (b"\x76\x2f\x31\x01", "OpenEXR is not read: convert it to float TIFF"),
-    (b"\xff\x0a", "JPEG XL is not read: convert it to PNG or TIFF"),
-    (b"\0\0\0\x0cJXL ", "JPEG XL is not read: convert it to PNG or TIFF"),
-    (b"\0\0\0\x0cjP  ", "JPEG 2000 is not read: convert it to PNG or TIFF"),
-    (b"\xff\x4f\xff\x51", "JPEG 2000 is not read: convert it to PNG or TIFF"),
-    (b"SIMPLE  =", "FITS is not read: convert it to float TIFF"),
-    (b"#?RADIANCE", "Radiance HDR is not read: convert it to float TIFF"),
-    (b"ZISRAWFILE", MICROSCOPE),
-    (b"\xda\xce\xbe\x0a", MICROSCOPE),
-    (b"\x70\0\0\0", MICROSCOPE),
-    (b"\x89HDF\r\n\x1a\n", ARRAYS),
-    (b"MATLAB 5.0 MAT-file", ARRAYS),
+const DPX: &str = "DPX is not read: convert it to 16-bit TIFF";
+const MRC: &str = "MRC is not read: convert it to TIFF (`mrc2tif`, or ImageJ)";
+
+/// Formats that are not read, by bytes at a place.
+const OTHERS: [(usize, &[u8], &str); 34] = [
+    (0, b"GIF8", "GIF is not read: convert it to PNG or TIFF"),
+    (0, b"\x76\x2f\x31\x01", "OpenEXR is not read: convert it to float TIFF"),
+    (0, b"\xff\x0a", "JPEG XL is not read: convert it to PNG or TIFF"),
+    (0, b"\0\0\0\x0cJXL ", "JPEG XL is not read: convert it to PNG or TIFF"),
+    (0, b"\0\0\0\x0cjP  ", "JPEG 2000 is not read: convert it to PNG or TIFF"),
+    (0, b"\xff\x4f\xff\x51", "JPEG 2000 is not read: convert it to PNG or TIFF"),
+    (0, b"SIMPLE  =", "FITS is not read: convert it to float TIFF"),
+    (0, b"#?RADIANCE", "Radiance HDR is not read: convert it to float TIFF"),
+    (0, b"8BPS", "Photoshop's .psd is not read: save it as PNG or TIFF"),
+    (0, b"SDPX", DPX),
+    (0, b"XPDS", DPX),
+    (128, b"DICM", "DICOM is not read: convert it to PNG or TIFF (ImageJ)"),
+    (0, b"NRRD000", "NRRD is not read: convert it to float TIFF or .npy"),
+    (208, b"MAP DD\0\0", MRC),
+    (208, b"MAP DA\0\0", MRC),
+    (208, b"MAP \x11\x11\0\0", MRC),
+    (0, b"ZISRAWFILE", MICROSCOPE),
+    (0, b"\xda\xce\xbe\x0a", MICROSCOPE),
+    (0, b"\x70\0\0\0", MICROSCOPE),
+    // Gatan's .dm3 and .dm4.
+    (0, b"\0\0\0\x03", MICROSCOPE),
+    (0, b"\0\0\0\x04\0\0\0\0", MICROSCOPE),
     (
+        0,
+        b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1",
+        "it is an OLE file (a microscope's .zvi or .oib), which is not read: convert it to OME-TIFF (Bio-Formats: bfconvert)",
+    ),
+    (0, b"\x89HDF\r\n\x1a\n", ARRAYS),
+    (0, b"MATLAB 5.0 MAT-file", ARRAYS),
+    (
+        0,
         b"PK\x03\x04",
         "it is an archive (.zip or .npz): unpack it; save an image as float TIFF (`tifffile.imwrite`), a map as .npy (`numpy.save`)",
     ),
-    (b"Pf\n", "PFM is not read: convert it to float TIFF or .npy"),
-    (b"PF\n", "PFM is not read: convert it to float TIFF or .npy"),
-    (b"\x93NUMPY", ".npy is read for maps, not for images: save an image as float TIFF (`tifffile.imwrite`)"),
-    (b"PIEH", "Sintel's .dpt is not read: convert it to float TIFF or .npy"),
-    (b"DIGITAL SURF", "Digital Surf's .sur is not read: export the heights as float TIFF"),
-    (b"DSCOMPRESSED", "Digital Surf's .sur is not read: export the heights as float TIFF"),
-    (b"%PDF", "it is a PDF file: export its image as PNG or TIFF"),
-    (b"\x1aE\xdf\xa3", VIDEO),
+    (0, b"Pf\n", "PFM is not read: convert it to float TIFF or .npy"),
+    (0, b"PF\n", "PFM is not read: convert it to float TIFF or .npy"),
+    (
+        0,
+        b"\x93NUMPY",
+        ".npy is read for maps, not for images: save an image as float TIFF (`tifffile.imwrite`)",
+    ),
+    (0, b"PIEH", "Sintel's .dpt is not read: convert it to float TIFF or .npy"),
+    (0, b"DIGITAL SURF", "Digital Surf's .sur is not read: export the heights as float TIFF"),
+    (0, b"DSCOMPRESSED", "Digital Surf's .sur is not read: export the heights as float TIFF"),
+    (0, b"%PDF", "it is a PDF file: export its image as PNG or TIFF"),
+    (0, b"\x1aE\xdf\xa3", VIDEO),
+    (
+        0,
+        b"version https://git-lfs.github.com/spec/",
+        "it is a pointer of Git LFS in place of the file: fetch the file with `git lfs pull`",
+    ),
 ];
 
 /// Bytes at the beginning that tell a format.
-pub(super) const HEAD_BYTES: u64 = 32;
+pub(super) const HEAD_BYTES: u64 = 256;
 
 /// Description and remedy of an unsupported format, else `None`.
 pub(super) fn unsupported(bytes: &[u8]) -> Option<&'static str> {
-    let brand = |names: &[&[u8]]| {
-        bytes.get(4..8) == Some(b"ftyp") && names.iter().any(|name| bytes.get(8..12) == Some(name))
-    };
+    // Of an ISO base media file: the major brand, a version, compatible brands (ISO 14496-12, section 4.3).
+    let is_media = bytes.get(4..8) == Some(b"ftyp");
+    let length = bytes.first_chunk().map_or(0, |length| u32::from_be_bytes(*length) as usize);
+    let brands = bytes.get(8..length.clamp(8, bytes.len().max(8))).filter(|_| is_media).unwrap_or_default();
+    let brands = brands.as_chunks::<4>().0;
+    let brand = |names: &[&[u8; 4]]| brands.iter().any(|brand| names.contains(&brand));
     let raw_magics: [&[u8]; 6] = [b"FUJIFILMCCD-RAW", b"IIRO", b"IIRS", b"MMOR", b"IIU\0", b"FOVb"];
     if bytes.get(8..10) == Some(b"CR") && bytes.starts_with(b"II*\0")
         || brand(&[b"crx "])
@@ -53,18 +85,20 @@ pub(super) fn unsupported(bytes: &[u8]) -> Option<&'static str> {
     {
         return Some(RAW);
     }
-    if brand(&[b"heic", b"heix", b"mif1", b"msf1", b"hevc"]) {
+    if brand(&[b"avif", b"avis"]) || bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP") {
+        return Some("AVIF and WebP are not read: convert it to PNG or TIFF");
+    }
+    if brand(&[b"heic", b"heix", b"mif1", b"msf1", b"hevc", b"hevx"]) {
         return Some(
             "it is a HEIC file, which is not read: convert it to PNG or TIFF, or set the phone to \"most compatible\"",
         );
     }
-    if brand(&[b"avif", b"avis"]) || bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP") {
-        return Some("AVIF and WebP are not read: convert it to PNG or TIFF");
-    }
-    if bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"AVI ") || bytes.get(4..8) == Some(b"ftyp") {
+    if bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"AVI ") || is_media {
         return Some(VIDEO);
     }
-    OTHERS.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|(_, advice)| *advice)
+    let found =
+        OTHERS.iter().find(|(at, magic, _)| bytes.get(*at..).is_some_and(|rest| rest.starts_with(magic)));
+    found.map(|(.., advice)| *advice)
 }
 
 /// A JPEG up to its end marker, without stray bytes between its segments, which decoders skip; `None` without an end. Later data
@@ -194,6 +228,12 @@ pub(super) fn png_images(bytes: &[u8]) -> u32 {
 /// Significant bits of a PNG's first channel (chunk sBIT), if given.
 pub(super) fn png_significant_bits(bytes: &[u8]) -> Option<u8> {
     png_chunk(bytes, b"sBIT")?.first().copied().filter(|bits| (1..=16).contains(bits))
+}
+
+/// Bits of a grey PNG that has fewer than 8.
+pub(super) fn png_grey_bits(bytes: &[u8]) -> Option<u8> {
+    let [bits, kind] = *bytes.get(24..)?.first_chunk()?;
+    (kind == 0 && bits < 8).then_some(bits)
 }
 
 fn png_chunk<'a>(bytes: &'a [u8], name: &[u8; 4]) -> Option<&'a [u8]> {

@@ -1,15 +1,17 @@
 //! Decodes files to upright grey samples.
 
-use std::io::Cursor;
+use std::{borrow::Cow, io::Cursor};
 
-use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits, codecs::pnm::PnmDecoder};
 use ndarray::{Array2, Array3};
 use zune_jpeg::{
     JpegDecoder,
     zune_core::{bytestream::ZCursor, colorspace::ColorSpace, options::DecoderOptions},
 };
 
-use super::{GreyImage, ReadSettings, Samples, complete, metadata, tiff_file, tiff_file::Signed, tiff_tags};
+use super::{
+    GreyImage, ReadSettings, Samples, bmp, complete, metadata, tiff_file, tiff_file::Signed, tiff_tags,
+};
 use crate::video::Pixels;
 
 pub(crate) type Samples8 = Pixels;
@@ -41,11 +43,13 @@ pub(crate) struct Decoded {
     pub values: Values,
     /// White level in codes from metadata on the camera's bit depth.
     pub white_level: Option<u16>,
+    /// Largest code of the file, if the decoder scales it to the largest of `values`.
+    pub largest: Option<u32>,
     /// As in [`GreyImage`].
     pub coding_variance: f64,
 }
 
-const INCOMPLETE: &str =
+pub(super) const INCOMPLETE: &str =
     "it is incomplete: the data end before the image does; copy it again from the camera";
 
 pub(super) fn said(error: impl std::fmt::Display) -> String {
@@ -60,15 +64,19 @@ pub(super) fn most_bytes(file: u64) -> u64 {
 }
 
 pub(crate) fn decode(bytes: &[u8]) -> Result<Decoded, String> {
-    decode_with(bytes, Signed::Refused)
+    decode_with(bytes, None, Signed::Refused)
 }
 
-pub(crate) fn decode_with(bytes: &[u8], signed: Signed) -> Result<Decoded, String> {
+/// Decodes page `number` (from 1), or the only image.
+pub(crate) fn decode_with(bytes: &[u8], number: Option<usize>, signed: Signed) -> Result<Decoded, String> {
     if let Some(advice) = complete::unsupported(bytes) {
         return Err(advice.into());
     }
     if tiff_tags::is_tiff(bytes) {
-        return tiff_file::decode(bytes, signed);
+        return tiff_file::decode(bytes, number, signed);
+    }
+    if number.is_some_and(|number| number != 1) {
+        return Err("it has one image: only TIFF files have pages".into());
     }
     let (decoded, orientation) = if bytes.starts_with(b"\xff\xd8") { jpeg(bytes)? } else { other(bytes)? };
     Ok(decoded.turned(orientation))
@@ -103,8 +111,9 @@ fn jpeg(bytes: &[u8]) -> Result<(Decoded, u8), String> {
         metadata::orientation(decoder.exif().map(Vec::as_slice), decoder.xmp().map(Vec::as_slice));
     let coding_variance = complete::jpeg_coding_variance(bytes).unwrap_or(0.0);
     let values = Values::U8(values);
+    let (white_level, largest) = (None, None);
     let decoded =
-        Decoded { width, height, channels, colours: channels, values, white_level: None, coding_variance };
+        Decoded { width, height, channels, colours: channels, values, white_level, largest, coding_variance };
     Ok((decoded, orientation))
 }
 
@@ -125,6 +134,12 @@ fn other(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     if images > 1 {
         return Err(format!("it is an animation of {images} images: store each as a file"));
     }
+    let numbered = if format == ImageFormat::Bmp { bmp::numbered(bytes) } else { None };
+    let (bytes, palette): (Cow<'_, [u8]>, _) = match numbered {
+        Some((numbered, palette)) => (Cow::Owned(numbered), Some(palette)),
+        None => (Cow::Borrowed(bytes), None),
+    };
+    let bytes = &*bytes;
     let mut cursor = Cursor::new(bytes);
     let mut reader = ImageReader::with_format(&mut cursor, format);
     reader.no_limits();
@@ -149,7 +164,7 @@ fn other(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     let (channels, values) = match image {
         Image::ImageLuma8(i) => (1, Values::U8(i.into_raw())),
         Image::ImageLumaA8(i) => (2, Values::U8(i.into_raw())),
-        Image::ImageRgb8(i) => (3, Values::U8(i.into_raw())),
+        Image::ImageRgb8(i) => (3, Values::U8(bmp::coloured(i.into_raw(), palette.as_deref()))),
         Image::ImageRgba8(i) => (4, Values::U8(i.into_raw())),
         Image::ImageLuma16(i) => (1, Values::U16(i.into_raw())),
         Image::ImageLumaA16(i) => (2, Values::U16(i.into_raw())),
@@ -160,11 +175,19 @@ fn other(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     let significant = (format == ImageFormat::Png).then(|| complete::png_significant_bits(bytes)).flatten();
     // Shifted up to 16 bits: the largest code has trailing zeros.
     let white_level = significant.filter(|bits| (8..16).contains(bits)).map(|bits| 0xffff << (16 - bits));
+    let largest = match format {
+        ImageFormat::Pnm => PnmDecoder::new(bytes).ok().map(|pnm| pnm.header().maximal_sample()),
+        ImageFormat::Png => complete::png_grey_bits(bytes).map(|bits| (1 << bits) - 1),
+        _ => None,
+    };
     let colours = if channels < 3 { 1 } else { 3 };
-    Ok((Decoded { width, height, channels, colours, values, white_level, coding_variance: 0.0 }, orientation))
+    let coding_variance = 0.0;
+    let decoded = Decoded { width, height, channels, colours, values, white_level, largest, coding_variance };
+    Ok((decoded, orientation))
 }
 
 impl Decoded {
+    /// Fails for a white level that is no code of the file.
     pub(crate) fn grey(self, settings: &ReadSettings) -> Result<GreyImage, String> {
         let of_file = if let Values::U16(codes) = &self.values {
             settings
@@ -180,14 +203,15 @@ impl Decoded {
             Values::U16(_) => 65535.0,
             _ => 1.0,
         };
+        let largest = self.largest.map_or(full_scale, f64::from);
         let white_level = match settings.white_level {
             Some(code) if !matches!(self.values, Values::U8(_) | Values::U16(_)) => {
                 return Err(format!("it has no integer codes, of which {code} could be the white level"));
             }
-            Some(code) if code == 0 || f64::from(code) > full_scale => {
-                return Err(format!("a white level of {code} is outside its codes, 1 to {full_scale}"));
+            Some(code) if code == 0 || f64::from(code) > largest => {
+                return Err(format!("a white level of {code} is outside its codes, 1 to {largest}"));
             }
-            Some(code) => Some((f64::from(code) / full_scale) as f32),
+            Some(code) => Some((f64::from(code) / largest) as f32),
             None => of_file.map(|code| (f64::from(code) / full_scale) as f32),
         };
         let weights = settings.grey.weights();

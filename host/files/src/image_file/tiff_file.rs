@@ -1,5 +1,7 @@
 //! TIFF pages and their pixels.
 
+mod palette;
+
 use std::{
     fs::File,
     io::{BufReader, Cursor, Read, Seek},
@@ -13,7 +15,7 @@ use tiff::{
 
 use super::{
     ImageError, complete,
-    decode::{Decoded, Values, most_bytes, said},
+    decode::{Decoded, INCOMPLETE, Values, most_bytes, said},
     tiff_tags::{self, Directory, InFile, Source},
 };
 
@@ -58,9 +60,8 @@ impl Pages {
     pub fn decode(&self, number: usize) -> Result<Decoded, ImageError> {
         let file =
             File::open(&self.path).map_err(|source| ImageError::Read { path: self.path.clone(), source })?;
-        let page = number.checked_sub(1).and_then(|index| self.pages.get(index)).ok_or_else(|| {
-            format!("it has no page {number}: pages are numbered from 1 to {}", self.pages.len())
-        });
+        let page = number.checked_sub(1).and_then(|index| self.pages.get(index));
+        let page = page.ok_or_else(|| no_page(number, &self.pages));
         let decoded =
             page.and_then(|page| decode_page(BufReader::new(file), self.size, page, Signed::Refused));
         decoded.map_err(|reason| {
@@ -115,15 +116,28 @@ fn pages<S: Source + ?Sized>(source: &S) -> Result<Vec<Page>, String> {
     Ok(pages)
 }
 
-pub(super) fn decode(bytes: &[u8], signed: Signed) -> Result<Decoded, String> {
+fn no_page(number: usize, pages: &[Page]) -> String {
+    format!("it has no page {number}: pages are numbered from 1 to {}", pages.len())
+}
+
+/// Decodes page `number` (from 1), or the only one.
+pub(super) fn decode(bytes: &[u8], number: Option<usize>, signed: Signed) -> Result<Decoded, String> {
     let pages = pages(bytes)?;
-    if let [page] = pages.as_slice() {
+    let page = match (number, pages.as_slice()) {
+        (Some(number), _) => {
+            let page = number.checked_sub(1).and_then(|index| pages.get(index));
+            Some(page.ok_or_else(|| no_page(number, &pages))?)
+        }
+        (None, [page]) => Some(page),
+        (None, _) => None,
+    };
+    if let Some(page) = page {
         return decode_page(Cursor::new(bytes), bytes.len() as u64, page, signed);
     }
     let sizes: Vec<String> =
         pages.iter().take(3).map(|p| format!("{}x{}", p.directory.width, p.directory.height)).collect();
     Err(format!(
-        "it holds {} images ({}{}): name one as FILE#1 to FILE#{}, or measure all of them with `farnear focus-stack`",
+        "it holds {} images ({}{}): name one as FILE#1 to FILE#{}, or give `farnear focus-stack` this file alone",
         pages.len(),
         sizes.join(", "),
         if pages.len() > 3 { ", ..." } else { "" },
@@ -178,7 +192,8 @@ fn unsupported(page: &Directory) -> Option<String> {
     }
     let colours = match photometric {
         0..=2 => None,
-        3 => Some("colours from a palette".into()),
+        3 if palette::is_read(page) => None,
+        3 => Some("colours from a palette that is incomplete or of more than 8 bits".into()),
         5 => Some("CMYK colours".into()),
         6 => Some("YCbCr colours".into()),
         8..=10 => Some("L*a*b* colours".into()),
@@ -219,12 +234,22 @@ fn decode_page(file: impl Read + Seek, size: u64, page: &Page, signed: Signed) -
     if decoded_bytes > most_bytes(size) {
         return Err(format!("it is incomplete: {size} bytes cannot hold {width}x{height} px"));
     }
-    let say =
-        |error: tiff::TiffError| format!("{}; rewrite it, for instance with `tiffcp -c lzw`", said(error));
+    let say = |error: tiff::TiffError| {
+        let text = said(error);
+        if text == INCOMPLETE {
+            return text;
+        }
+        if text.contains("no lzw end code") {
+            return "its LZW data have no end: copy the file again; if they still have none, write it again in the program that made it"
+                .into();
+        }
+        format!("{text}; rewrite it, for instance with `tiffcp -c lzw`")
+    };
     let mut limits = Limits::default();
     limits.decoding_buffer_size = usize::try_from(most_bytes(size)).unwrap_or(usize::MAX);
     limits.intermediate_buffer_size = limits.decoding_buffer_size;
     limits.ifd_value_size = usize::try_from(size).unwrap_or(usize::MAX).max(1 << 20);
+    let file = palette::AsGrey::new(file, &page.directory);
     let mut decoder = Decoder::new(file).map_err(say)?.with_limits(limits);
     if page.index > 0 {
         decoder.seek_to_image(page.index).map_err(say)?;
@@ -290,7 +315,10 @@ fn decode_page(file: impl Read + Seek, size: u64, page: &Page, signed: Signed) -
         _ => return Err(format!("its samples are {colour:?}: convert it to grey or RGB of 8 or 16 bits")),
     };
     let white_level = camera_white(&page.directory);
-    let decoded = Decoded { width, height, channels, colours, values, white_level, coding_variance: 0.0 };
+    let largest = [1, 2, 4].contains(&bits).then(|| (1 << bits) - 1);
+    let decoded =
+        Decoded { width, height, channels, colours, values, white_level, largest, coding_variance: 0.0 };
+    let decoded = palette::coloured(decoded, &page.directory);
     Ok(decoded.turned(page.directory.orientation.unwrap_or(1)))
 }
 

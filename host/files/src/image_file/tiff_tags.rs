@@ -14,6 +14,8 @@ const ENTRIES_MAX: u64 = 4096;
 /// OME-XML of large stacks has megabytes.
 const TEXT_MAX: u64 = 64 << 20;
 const SUB_IMAGES_MAX: usize = 16;
+/// Three values for each of 256 colours.
+const COLOUR_MAP_MAX: u64 = 3 << 8;
 const BLOCK_BYTES: u64 = 1 << 16;
 
 /// Contents of a file, by places.
@@ -83,6 +85,10 @@ pub(crate) struct Directory {
     /// Tag 255 (obsolete): 2 = reduced resolution.
     pub old_subfile: u64,
     pub photometric: u64,
+    /// Place of its value in the file.
+    pub photometric_at: u64,
+    /// Tag 320: red of each colour of a palette, then green, then blue.
+    pub colour_map: Vec<u64>,
     /// Tag 266: 2 = the lowest bit of a byte comes first.
     pub fill_order: u64,
     pub planar: u64,
@@ -104,6 +110,7 @@ pub(crate) struct Directory {
     pub strip_offset: u64,
     pub strips: u64,
     pub x_resolution: Option<f64>,
+    pub y_resolution: Option<f64>,
     /// Tag 281.
     pub max_sample_value: Option<u64>,
     pub extra_samples: Option<u64>,
@@ -115,7 +122,7 @@ pub(crate) struct Directory {
     pub exposed: Option<String>,
     pub exposed_fraction: Option<String>,
     pub is_dng: bool,
-    /// Width and height of the images in tag 330.
+    /// Width and height of the images in tag 330, without those of reduced resolution.
     pub sub_images: Vec<(u64, u64)>,
     pub micro_manager: Option<String>,
     /// Tag 33629 of MetaMorph: planes behind this one, without directories.
@@ -237,8 +244,15 @@ impl<'a, S: Source + ?Sized> File<'a, S> {
         let place = if fits { field } else { self.number(field, inline)? };
         let value = |index: u64| self.number(place.checked_add(index * size as u64)?, size);
         let text = || {
-            let text = self.source.read(place, count.min(TEXT_MAX))?;
-            Some(String::from_utf8_lossy(&text).trim_end_matches('\0').to_owned())
+            let bytes = self.source.read(place, count.min(TEXT_MAX))?;
+            // Old programs write Latin-1, whose codes are those of Unicode.
+            let text = str::from_utf8(&bytes)
+                .map_or_else(|_| bytes.iter().map(|b| char::from(*b)).collect(), str::to_owned);
+            Some(text.trim_end_matches('\0').to_owned())
+        };
+        let ratio = || {
+            let [above, below] = [0, 4].map(|skip| self.number(place.saturating_add(skip), 4));
+            above.zip(below).map(|(above, below)| above as f64 / below as f64)
         };
         let first = || value(0).unwrap_or(0);
         match tag {
@@ -248,7 +262,7 @@ impl<'a, S: Source + ?Sized> File<'a, S> {
             257 => directory.height = first(),
             258 => directory.bits = first(),
             259 => directory.compression = first(),
-            262 => directory.photometric = first(),
+            262 => (directory.photometric, directory.photometric_at) = (first(), place),
             266 => directory.fill_order = first(),
             284 => directory.planar = first(),
             317 => directory.predictor = first(),
@@ -265,16 +279,16 @@ impl<'a, S: Source + ?Sized> File<'a, S> {
             }
             277 => directory.samples_per_pixel = first(),
             281 => directory.max_sample_value = value(0),
-            282 => {
-                let [above, below] = [0, 4].map(|skip| self.number(place.saturating_add(skip), 4));
-                directory.x_resolution = above.zip(below).map(|(above, below)| above as f64 / below as f64);
-            }
+            282 => directory.x_resolution = ratio(),
+            283 => directory.y_resolution = ratio(),
             305 => directory.software = text(),
             306 => directory.date_time = text(),
+            320 => directory.colour_map = (0..count.min(COLOUR_MAP_MAX)).filter_map(value).collect(),
             330 if with_sub_images => {
                 let sub = |index| self.directory(value(index)?, false);
-                let sizes = (0..count).take(SUB_IMAGES_MAX).filter_map(sub);
-                directory.sub_images = sizes.map(|(sub, _)| (sub.width, sub.height)).collect();
+                let images = (0..count).take(SUB_IMAGES_MAX).filter_map(sub).map(|(sub, _)| sub);
+                let whole = images.filter(|sub| !sub.reduced());
+                directory.sub_images = whole.map(|sub| (sub.width, sub.height)).collect();
             }
             34665 if with_sub_images => {
                 if let Some((exif, _)) = value(0).and_then(|at| self.directory(at, false)) {

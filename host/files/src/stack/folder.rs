@@ -15,8 +15,8 @@ fn format(path: &Path) -> Option<&'static str> {
         "tif" | "tiff" => "TIFF",
         "jpg" | "jpeg" | "jfif" | "jpe" => "JPEG",
         "png" => "PNG",
-        "bmp" => "BMP",
-        "pgm" | "ppm" => "PGM",
+        "bmp" | "dib" => "BMP",
+        "pgm" | "ppm" | "pnm" | "pbm" | "pam" => "PGM",
         _ => return None,
     })
 }
@@ -130,6 +130,16 @@ mod tests {
         std::os::unix::fs::symlink("absent", linked.path().join("notes")).unwrap();
         fs::remove_file(linked.path().join("i2.png")).unwrap();
         assert_eq!(list(linked.path()).unwrap().images.len(), 2);
+    }
+
+    #[test]
+    fn endings_of_one_format_are_one_format() {
+        for names in [["1.pgm", "2.pnm", "3.pbm", "4.pam"], ["1.bmp", "2.dib", "3.BMP", "4.DIB"]] {
+            let stack = folder(&names.map(|name| (name, b"P5".as_slice())));
+            assert_eq!(list(stack.path()).unwrap().images.len(), 4, "{names:?}");
+        }
+        let known = |ending: &str| format(Path::new(&format!("a.{ending}"))).is_some();
+        assert!(crate::video::pictures::EXTENSIONS.into_iter().all(known));
     }
 
     #[test]

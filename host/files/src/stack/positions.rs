@@ -1,9 +1,13 @@
 //! Order and focus positions of TIFF pages by microscopes and ImageJ.
 
+mod image_j;
 mod micro_manager;
 mod ome;
 
 use crate::image_file::{Page, tiff_tags::Directory};
+
+/// Sides of a pixel that differ by more than this part are not one size.
+const SQUARE: f64 = 0.05;
 
 /// The planes of a focus series.
 #[derive(Clone, PartialEq, Debug, Default)]
@@ -22,8 +26,8 @@ pub(super) fn of(pages: &[Page]) -> Result<Planes, String> {
     let Some(first) = pages.first() else { return Ok(in_order(None)) };
     let description = first.directory.description.as_deref().unwrap_or_default();
     micro_manager::one_series(pages)?;
-    if description.starts_with("ImageJ=") {
-        let (positions_um, remark) = image_j(description, pages.len())?;
+    if let Some(description) = image_j::Description::of(description) {
+        let (positions_um, remark) = description.positions_um(pages)?;
         return Ok(Planes { remarks: Vec::from_iter(remark), ..in_order(positions_um) });
     }
     if let Some(volume) = first.directory.volume() {
@@ -45,18 +49,28 @@ pub(super) fn of_files(pages: &[Page], names: &[String]) -> Result<Option<Planes
     ome::Metadata::of(description).map_or(Ok(None), |metadata| metadata.files(names))
 }
 
-/// Side of a pixel at the object; `None` if not stated.
-pub(super) fn object_pixel_um(pages: &[Page]) -> Option<f64> {
-    let directory = &pages.first()?.directory;
-    let description = directory.description.as_deref()?;
-    let side = if description.starts_with("ImageJ=") {
-        let unit = description.lines().find_map(|line| line.strip_prefix("unit="))?;
-        // One pixel per unit: the scale was never set.
-        unit_um(unit)? / directory.x_resolution.filter(|resolution| *resolution != 1.0)?
-    } else {
-        ome::Metadata::of(description)?.pixel_um()?
+/// Side of a square pixel at the object, if stated, and a remark on pixels that are not square.
+pub(super) fn object_pixel_um(pages: &[Page]) -> (Option<f64>, Option<String>) {
+    let sides = || {
+        let directory = &pages.first()?.directory;
+        let description = directory.description.as_deref()?;
+        let sides = match image_j::Description::of(description) {
+            Some(description) => description.pixel_um(directory),
+            None => ome::Metadata::of(description)?.pixel_um(),
+        };
+        let [width, height] = sides.map(|side| side.filter(|side| side.is_finite() && *side > 0.0));
+        Some((width?, height.unwrap_or(width?)))
     };
-    (side.is_finite() && side > 0.0).then_some(side)
+    match sides() {
+        Some((width, height)) if (width - height).abs() > SQUARE * width.min(height) => {
+            let remark = format!(
+                "the metadata state pixels of {width} x {height} um, and slopes need square ones: they are per pixel; resample the \
+                 images to square pixels"
+            );
+            (None, Some(remark))
+        }
+        sides => (sides.map(|(width, _)| width), None),
+    }
 }
 
 /// Some programs write the position of the first plane for all.
@@ -64,40 +78,29 @@ fn moving(positions: &[f64]) -> bool {
     positions.windows(2).any(|two| two[0] != two[1])
 }
 
-/// Positions in um, and a remark on them.
-fn image_j(description: &str, pages: usize) -> Result<(Option<Vec<f64>>, Option<String>), String> {
-    let value = |key: &str| {
-        description.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix('=')).map(str::trim)
+/// The step between planes that a file states, in um, or a remark that it is not used.
+fn step_um(stated: &str, unit: &str) -> (Option<f64>, Option<String>) {
+    const SET: &str = "it is not used; set it in ImageJ (Image > Properties)";
+    let Some(step) = finite(stated).filter(|step| *step != 0.0) else {
+        let remark = format!(
+            "the file states a spacing of the planes ({stated}) where a number other than 0 was expected: {SET}"
+        );
+        return (None, Some(remark));
     };
-    let count = |key| value(key).and_then(|text| text.parse::<usize>().ok()).unwrap_or(1);
-    one_series(count("channels"), count("frames"))?;
-    let images = count("images");
-    if images != pages && images > 1 {
-        return Err(format!(
-            "its description has {images} images and the file lists {pages}: open it in ImageJ and save it as an image sequence"
-        ));
-    }
-    let unit = value("zunit").or(value("unit")).unwrap_or("none");
-    let spacing = match value("spacing") {
-        Some(text) => text.parse::<f64>().ok().filter(|spacing| spacing.is_finite() && *spacing != 0.0),
-        None => Some(1.0),
-    };
-    let Some(spacing) = spacing.filter(|_| pages > 1) else { return Ok((None, None)) };
-    let Some(um) = unit_um(unit) else {
-        let remark = (spacing != 1.0).then(|| {
-            format!(
-                "the file states a spacing of the planes ({spacing}) and no unit of length ({unit}): it is not used; set the unit \
-                 in ImageJ (Image > Properties)"
-            )
-        });
-        return Ok((None, remark));
-    };
-    let remark = value("spacing").is_none().then(|| {
-        format!(
-            "the file states a unit ({unit}) and no spacing of the planes: it counts as 1 {unit}, as in ImageJ (Image > Properties)"
-        )
+    let um = unit_um(unit);
+    // Without a unit, 1 is no statement.
+    let remark = (um.is_none() && step != 1.0).then(|| {
+        format!("the file states a spacing of the planes ({step}) and no unit of length ({unit}): {SET}")
     });
-    Ok((Some((0..pages).map(|page| page as f64 * (spacing * um)).collect()), remark))
+    (um.map(|um| step * um), remark)
+}
+
+fn even(step: f64, planes: usize) -> Vec<f64> {
+    (0..planes).map(|plane| plane as f64 * step).collect()
+}
+
+fn finite(text: &str) -> Option<f64> {
+    text.trim().parse().ok().filter(|value: &f64| value.is_finite())
 }
 
 /// An array in the pages, as `tifffile` describes it: `{"shape": [5, 300, 400], "axes": "ZYX"}`; axes are optional.
@@ -165,12 +168,53 @@ fn one_series(channels: usize, times: usize) -> Result<(), String> {
     Ok(())
 }
 
+/// Text with character references of XML and escapes of Java (`\u00B5`) as characters.
+fn unescaped(text: &str) -> String {
+    let mut all = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(at) = rest.find(['&', '\\']) {
+        all.push_str(&rest[..at]);
+        let escape = &rest[at..];
+        let found = match escape.strip_prefix("\\u").and_then(|digits| digits.get(..4)) {
+            Some(digits) => character(digits, 16).map(|found| (found, 6)),
+            None => escape
+                .strip_prefix('&')
+                .and_then(|name| name.split_once(';'))
+                .and_then(|(name, _)| Some((referenced(name)?, name.len() + 2))),
+        };
+        let (found, length) = found.unwrap_or((if escape.starts_with('&') { '&' } else { '\\' }, 1));
+        all.push(found);
+        rest = &escape[length..];
+    }
+    all + rest
+}
+
+/// The character of a reference `&name;` (XML 1.0, section 4.1).
+fn referenced(name: &str) -> Option<char> {
+    match name.strip_prefix('#') {
+        Some(number) => match number.strip_prefix('x') {
+            Some(digits) => character(digits, 16),
+            None => character(number, 10),
+        },
+        None => Some(match name {
+            "amp" => '&',
+            "lt" => '<',
+            "gt" => '>',
+            "quot" => '"',
+            "apos" => '\'',
+            "micro" => '\u{b5}',
+            _ => return None,
+        }),
+    }
+}
+
+fn character(digits: &str, radix: u32) -> Option<char> {
+    u32::from_str_radix(digits, radix).ok().and_then(char::from_u32)
+}
+
 /// Micrometres per unit; `None` for pixels and unknown units.
 pub(super) fn unit_um(unit: &str) -> Option<f64> {
-    let mut unit = unit.trim().to_lowercase();
-    for micro in ["\\u00b5", "\\u03bc", "&#181;", "&#xb5;", "&#956;", "&#x3bc;", "\u{b5}", "\u{3bc}"] {
-        unit = unit.replace(micro, "u");
-    }
+    let unit = unescaped(unit).trim().to_lowercase().replace(['\u{b5}', '\u{3bc}'], "u");
     let unit = unit.replace("metre", "meter");
     // `ms` is a time.
     let singular = unit.strip_suffix('s').filter(|unit| unit.len() > 3).unwrap_or(&unit);
@@ -179,8 +223,12 @@ pub(super) fn unit_um(unit: &str) -> Option<f64> {
         "nm" | "nanometer" => 1e-3,
         "mm" | "millimeter" => 1e3,
         "cm" | "centimeter" => 1e4,
+        "dm" | "decimeter" => 1e5,
         "m" | "meter" => 1e6,
+        "km" | "kilometer" => 1e9,
+        "thou" | "mil" => 25.4,
         "inch" | "inche" | "in" => 25_400.0,
+        "ft" | "foot" | "feet" => 304_800.0,
         "\u{e5}" | "angstrom" => 1e-4,
         "pm" | "picometer" => 1e-6,
         _ => return None,
@@ -201,53 +249,6 @@ pub(super) mod tests {
 
     pub(super) fn positions(pages: &[Page]) -> Result<Option<Vec<f64>>, String> {
         of(pages).map(|planes| planes.positions_um)
-    }
-
-    #[test]
-    fn image_j_gives_the_spacing_with_its_unit() {
-        let text = "ImageJ=1.54f\nimages=3\nslices=3\nunit=nm\nspacing=250.0\nloop=false\n";
-        assert_eq!(positions(&pages(3, text)), Ok(Some(vec![0.0, 0.25, 0.5])));
-        assert_eq!(
-            positions(&pages(3, "ImageJ=1.54f\nimages=3\nunit=\\u00B5m\nspacing=-2")),
-            Ok(Some(vec![0.0, -2.0, -4.0]))
-        );
-        assert_eq!(positions(&pages(3, "ImageJ=1.54f\nimages=3\nunit=pixel\nspacing=2")), Ok(None));
-        assert!(
-            of(&pages(6, "ImageJ=1.54f\nimages=6\nchannels=2\nslices=3")).unwrap_err().contains("2 channels")
-        );
-        assert!(of(&pages(1, "ImageJ=1.54f\nimages=900\nslices=900")).unwrap_err().contains("900 images"));
-    }
-
-    #[test]
-    fn image_j_has_a_unit_for_z_and_leaves_a_spacing_of_one_out() {
-        let spaced = |lines: &str| {
-            let planes = of(&pages(2, &format!("ImageJ=1.54f\nimages=2\n{lines}"))).unwrap();
-            (planes.positions_um.map(|positions| positions[1]), planes.remarks.join(""))
-        };
-        let none = String::new;
-        assert_eq!(spaced("unit=mm\nzunit=um\nspacing=2.5\n"), (Some(2.5), none()));
-        assert_eq!(spaced("unit=pixel\nzunit=\\u00B5m\nspacing=2.5\n"), (Some(2.5), none()));
-        for (unit, um) in [
-            ("millimeters", 1e3),
-            ("micrometer", 1.0),
-            ("Microns", 1.0),
-            ("\\u00b5m", 1.0),
-            ("micrometres", 1.0),
-            ("inches", 25_400.0),
-            ("nanometers", 1e-3),
-        ] {
-            assert_eq!(spaced(&format!("unit={unit}\nspacing=2\n")), (Some(2.0 * um), none()), "{unit}");
-        }
-        let (positions, remark) = spaced("unit=um\n");
-        assert!(positions == Some(1.0) && remark.contains("counts as 1 um"), "{remark}");
-        for lines in ["unit=pixel\n", "unit=ms\n", "unit=um\nspacing=0\n", "", "spacing=1.0\n"] {
-            assert_eq!(spaced(lines), (None, none()), "{lines}");
-        }
-        for (lines, unit) in [("unit=pixel\nspacing=2\n", "(pixel)"), ("spacing=2.0\n", "(none)")] {
-            let (positions, remark) = spaced(lines);
-            assert_eq!(positions, None);
-            assert!(remark.contains("planes (2)") && remark.contains(unit), "{remark}");
-        }
     }
 
     #[test]
@@ -284,12 +285,42 @@ pub(super) mod tests {
 
     #[test]
     fn the_side_of_a_pixel_comes_from_ome_and_image_j() {
+        let side = |pages: &[Page]| {
+            let (side, remark) = object_pixel_um(pages);
+            (side, remark.is_some())
+        };
         let ome = "<OME><Pixels SizeX=\"8\" PhysicalSizeX=\"650\" PhysicalSizeXUnit=\"nm\"></Pixels></OME>";
-        assert_eq!(object_pixel_um(&pages(2, ome)), Some(0.65));
-        assert_eq!(object_pixel_um(&pages(2, &ome.replace("650", "0"))), None);
+        assert_eq!(side(&pages(2, ome)), (Some(0.65), false));
+        assert_eq!(side(&pages(2, &ome.replace("650", "0"))), (None, false));
         let mut image_j = pages(2, "ImageJ=1.54f\nimages=2\nunit=micron\n");
-        assert_eq!(object_pixel_um(&image_j), None);
+        assert_eq!(side(&image_j), (None, false));
         image_j[0].directory.x_resolution = Some(4.0);
-        assert_eq!(object_pixel_um(&image_j), Some(0.25));
+        assert_eq!(side(&image_j), (Some(0.25), false));
+    }
+
+    #[test]
+    fn pixels_that_are_not_square_have_no_side_and_a_remark() {
+        let ome = |height: &str| {
+            let xml = format!("<OME><Pixels PhysicalSizeX='0.5' PhysicalSizeY='{height}'></Pixels></OME>");
+            object_pixel_um(&pages(2, &xml))
+        };
+        let (side, remark) = ome("1.0");
+        assert!(side.is_none() && remark.is_some_and(|remark| remark.contains("0.5 x 1 um")));
+        assert_eq!(ome("0.51"), (Some(0.5), None));
+        let mut image_j = pages(2, "ImageJ=1.54f\nimages=2\nunit=micron\n");
+        (image_j[0].directory.x_resolution, image_j[0].directory.y_resolution) = (Some(4.0), Some(2.0));
+        let (side, remark) = object_pixel_um(&image_j);
+        assert!(side.is_none() && remark.is_some_and(|remark| remark.contains("0.25 x 0.5 um")));
+    }
+
+    #[test]
+    fn units_may_have_escapes() {
+        for micro in
+            ["&#181;", "&#0181;", "&#xb5;", "&#x00B5;", "&#956;", "&micro;", "\\u00B5", "\u{b5}", "\u{3bc}"]
+        {
+            assert_eq!(unit_um(&format!("{micro}m")), Some(1.0), "{micro}");
+        }
+        assert_eq!([unit_um("thou"), unit_um("dm"), unit_um("&#xffffffff;m")], [Some(25.4), Some(1e5), None]);
+        assert_eq!(unescaped("a&amp;b &lt; \\u03bc \\ & &x;"), "a&b < \u{3bc} \\ & &x;");
     }
 }

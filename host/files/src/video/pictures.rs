@@ -12,7 +12,8 @@ use crate::{
 };
 
 /// Lower-case endings of pictures; other files are ignored.
-pub const EXTENSIONS: [&str; 8] = ["png", "tif", "tiff", "jpg", "jpeg", "bmp", "pgm", "ppm"];
+pub const EXTENSIONS: [&str; 14] =
+    ["png", "tif", "tiff", "jpg", "jpeg", "jfif", "jpe", "bmp", "dib", "pgm", "ppm", "pnm", "pbm", "pam"];
 
 /// Pictures surveyed for their reading.
 const SURVEYED: usize = 8;

@@ -21,8 +21,7 @@ const EXACT: [f32; 2] = [1.1 / 255.0, 0.6 / 255.0]; // Pillow reduces 16-bit col
 /// Fewer pixels do not average the rounding of a JPEG.
 const TINY: usize = 256;
 /// Files that both read differently, with the reason.
-const KNOWN: [(&str, &str); 3] = [
-    ("rletrns.bmp", "pixels that the file leaves out are undefined"),
+const KNOWN: [(&str, &str); 2] = [
     ("mmap_error.bmp", "the pixels begin within the palette, which is broken"),
     ("flower-rgb-planar-16.tif", "Pillow mixes up the planes; tifffile agrees with farnear"),
 ];

@@ -274,6 +274,25 @@ mod tests {
     }
 
     #[test]
+    fn names_and_subjects_are_checked_before_masks_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let samples = |name: &str| {
+            let sample = "[[sample]]\nmasks = \"absent\"\nsubject = \"anna\"\nactivity = \"walk\"\n";
+            std::fs::write(folder.path().join(name), sample).unwrap();
+            folder.path().join(name)
+        };
+        let one = EvaluateRequest { samples: samples("a.toml"), ..EvaluateRequest::default() };
+        let same = vec!["wlak=walk".into()];
+        let model = EvaluateRequest { model: Some("everyday".into()), same, ..one.clone() };
+        let sets = EvaluateRequest { leave_one_set_out: vec![samples("b.toml")], ..model.clone() };
+        let others = EvaluateRequest { train: Some(samples("c.toml")), ..one };
+        for (request, phrase) in [(model, "`wlak`"), (sets, "`wlak`"), (others, "`anna`")] {
+            let error = request.run(&Context::unattended()).unwrap_err().to_string();
+            assert!(error.contains(phrase), "{error}");
+        }
+    }
+
+    #[test]
     fn training_needs_clips_and_options_of_motion_files_need_them() {
         let samples = TrainRequest { samples: Some("a.toml".into()), ..TrainRequest::default() };
         assert!(samples.check().is_ok());

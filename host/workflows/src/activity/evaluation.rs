@@ -75,6 +75,7 @@ pub(super) fn evaluate(
     context: &Context<'_>,
 ) -> Result<EvaluationFigures> {
     let start = Instant::now();
+    check_others(request)?;
     let method = request.method.method()?;
     method.announce(context);
     let test = Samples::read(&request.samples, context)?;
@@ -90,8 +91,10 @@ pub(super) fn evaluate(
         context.progress.warn(&format!("not trained, so their clips do not count: {}", not_known.join(", ")));
     }
     let subjects = names(test.iter().map(|clip| &clip.subject));
+    if request.train.is_none() && subjects.len() < 3 {
+        return Err(EvaluationError::Subjects(subjects.len()).into());
+    }
     let learned = train.as_deref().unwrap_or(&test);
-    check_subjects(request, &subjects, learned)?;
     let self_training = if request.adapt { ROUNDS } else { 0 };
     let experiment = Experiment { align: request.align, self_training, ..method.experiment(full_frames)? };
     let outcome =
@@ -192,17 +195,20 @@ impl Clips {
     }
 }
 
-fn check_subjects(request: &EvaluateRequest, subjects: &[String], learned: &[Clip]) -> Result<()> {
-    match (&request.train, request.leave_one_subject_out) {
-        (None, _) if subjects.len() < 3 => Err(EvaluationError::Subjects(subjects.len()).into()),
-        (None, _) | (Some(_), true) => Ok(()),
-        (Some(train), false) => {
-            let known = names(learned.iter().map(|clip| &clip.subject));
-            let Some(both) = subjects.iter().find(|subject| known.contains(subject)) else { return Ok(()) };
-            let (test, train) = (request.samples.clone(), train.clone());
-            Err(SamplesError::SamePerson { subject: both.clone(), test, train }.into())
-        }
-    }
+/// Refuses subjects of other training samples, unless each is left out in turn. Reads no masks.
+fn check_others(request: &EvaluateRequest) -> Result<()> {
+    let Some(train) = request.train.as_ref().filter(|_| !request.leave_one_subject_out) else {
+        return Ok(());
+    };
+    let tested = Samples::labels(&request.samples)?;
+    let trained = Samples::labels(train)?;
+    let [subjects, activities] = [0, 1].map(|at| names(trained.iter().map(|label| &label[at])));
+    // Clips of other activities do not count.
+    let counts =
+        |[subject, activity]: &[String; 2]| subjects.contains(subject) && activities.contains(activity);
+    let Some([subject, _]) = tested.into_iter().find(counts) else { return Ok(()) };
+    let (test, train) = (request.samples.clone(), train.clone());
+    Err(SamplesError::SamePerson { subject, test, train }.into())
 }
 
 /// Removes clips of activities outside the training set and returns these activities. Fails if no clip is left.

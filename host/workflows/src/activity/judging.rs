@@ -71,8 +71,8 @@ pub(super) fn judge(
     context: &Context<'_>,
 ) -> Result<JudgingFigures> {
     check_views(request.views, model.recogniser(true).views)?;
+    check_same(request, model)?;
     let samples = Samples::read_opened(&request.samples, request.open_blind_set.as_deref(), context)?;
-    check_same(request, samples.clips.iter().map(|clip| &clip.activity), model)?;
     let activities = model.activities();
     let name = |activity: &str| request.name_in_model(activity);
     let fused = request.views == Some(Views::Fused);
@@ -136,13 +136,12 @@ fn check_views(asked: Option<Views>, of_model: usize) -> Result<()> {
     Ok(())
 }
 
-/// Refuses pairs of names of which neither the samples nor the model know one.
-pub(super) fn check_same<'a>(
-    request: &EvaluateRequest,
-    of_samples: impl Iterator<Item = &'a String>,
-    model: &Model,
-) -> Result<()> {
-    let of_samples: BTreeSet<&str> = of_samples.map(String::as_str).collect();
+/// Refuses pairs of names of which the samples or the model lack one. Reads no masks.
+pub(super) fn check_same(request: &EvaluateRequest, model: &Model) -> Result<()> {
+    let mut of_samples = BTreeSet::new();
+    for set in std::iter::once(&request.samples).chain(&request.leave_one_set_out) {
+        of_samples.extend(Samples::labels(set)?.into_iter().map(|[_, activity]| activity));
+    }
     for (own, known) in request.same() {
         let same = || format!("{own}={known}");
         if !of_samples.contains(own) {

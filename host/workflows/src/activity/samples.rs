@@ -132,6 +132,11 @@ impl Samples {
         Ok(listed(path)?.samples.iter().map(|sample| base.join(&sample.masks)).collect())
     }
 
+    /// Subject and activity of every sample; reads no masks.
+    pub fn labels(path: &Path) -> Result<Vec<[String; 2]>> {
+        Ok(listed(path)?.samples.into_iter().map(|sample| [sample.subject, sample.activity]).collect())
+    }
+
     /// Reads and describes the masks. Fails for a mix of full frames and cut-out silhouettes.
     pub fn read(path: &Path, context: &Context<'_>) -> Result<Self> {
         Self::read_opened(path, None, context)

@@ -1,7 +1,7 @@
 //! Leave-one-set-out: evaluates a finished model, and thresholds from the other sets, on each set. A blind set
 //! (`blind = "why"`) needs a reason, which is recorded in `openings.csv` next to it.
 
-use std::{collections::BTreeSet, path::Path};
+use std::path::Path;
 
 use farnear_recognition::evaluation::calibration::{Reliability, area_under_roc};
 use farnear_recognition::model::Recogniser;
@@ -55,7 +55,6 @@ pub struct SetsFigures {
 
 struct Measured {
     name: String,
-    activities: BTreeSet<String>,
     known: Vec<(f32, bool)>,
     strange: Vec<f32>,
     right: usize,
@@ -70,12 +69,12 @@ pub(super) fn leave_one_set_out(
     request: &EvaluateRequest,
     context: &Context<'_>,
 ) -> Result<SetsFigures> {
+    check_same(request, model)?;
     let measured = std::iter::once(&request.samples)
         .chain(&request.leave_one_set_out)
         .map(|path| measured(model, path, request, context))
         .collect::<Result<Vec<Measured>>>()?;
     let sets: Vec<SetFigures> = (0..measured.len()).map(|left_out| figures(&measured, left_out)).collect();
-    check_same(request, measured.iter().flat_map(|set| &set.activities), model)?;
     let worst = |of: fn(&SetFigures) -> Option<f64>| sets.iter().filter_map(of).reduce(f64::max);
     Ok(SetsFigures {
         promised_unknown_of_known: rounded(f64::from(Limits::FALSE_ALARMS), 4),
@@ -108,7 +107,6 @@ fn measured(
     among.sort();
     among.dedup();
     let mut measured = Measured {
-        activities: samples.clips.iter().map(|clip| clip.activity.clone()).collect(),
         name: path
             .parent()
             .and_then(Path::file_name)
@@ -186,7 +184,6 @@ mod tests {
     fn set(name: &str, scores: impl Iterator<Item = f32>) -> Measured {
         Measured {
             name: name.into(),
-            activities: BTreeSet::new(),
             known: scores.map(|score| (score, true)).collect(),
             strange: vec![5.0, 6.0],
             right: 10,

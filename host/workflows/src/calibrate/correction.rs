@@ -17,6 +17,7 @@ use crate::{
     error::{Result, WorkflowError},
     figures::rounded_for,
     measure::read_map,
+    quantile,
     request::{PathKind, Request},
 };
 
@@ -177,12 +178,9 @@ pub fn list(list: &Path) -> Result<Vec<(PathBuf, f64)>> {
 
 /// Refuses a distance in another unit.
 fn check_distance(index: usize, pattern: &Pattern<'_>) -> Result<()> {
-    let mut depths: Vec<f32> = depths(pattern.depth_mm).collect();
-    if depths.is_empty() {
+    let Some(median) = quantile::of_values(depths(pattern.depth_mm).map(f64::from), 0.5) else {
         return Ok(());
-    }
-    let middle = depths.len() / 2;
-    let median = f64::from(*depths.select_nth_unstable_by(middle, f32::total_cmp).1);
+    };
     if (1.0 / LARGEST_RATIO..=LARGEST_RATIO).contains(&(pattern.true_mm / median)) {
         return Ok(());
     }

@@ -4,7 +4,7 @@ mod plot;
 mod verdict;
 
 use std::{
-    path::PathBuf,
+    path::{MAIN_SEPARATOR, Path, PathBuf},
     sync::atomic::{AtomicUsize, Ordering},
 };
 
@@ -260,8 +260,8 @@ impl Listed {
                     stack::list(&request.stack)?;
                 if let (None, Some([before, after])) = (&positions_um, order::gap(&images)) {
                     let expected = format!(
-                        "evenly spaced slices, but one is missing between {} and {}: take the stack again, or move the slices on one \
-                         side of the gap away",
+                        "evenly spaced slices, but at least one is missing between {} and {}: take the stack again, or move the slices \
+                         on one side of the gap away",
                         before.display(),
                         after.display()
                     );
@@ -378,6 +378,23 @@ fn read(
     Ok((slices, coding))
 }
 
+/// The far image of the pair whose range has the focus half way between its middle, where both images look the same, and
+/// an end.
+fn telling_pair(focus: f64, pair_step: usize, slices: usize) -> usize {
+    let off = |far: &usize| {
+        let alpha = 2.0 * (focus - *far as f64) / pair_step as f64 - 1.0;
+        (alpha.abs() - 0.5).abs()
+    };
+    (0..slices.saturating_sub(pair_step)).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0)
+}
+
+/// A path as a word of a shell's command.
+fn shell_word(path: &Path) -> String {
+    let text = path.display().to_string();
+    let is_plain = |c: char| c.is_alphanumeric() || c == MAIN_SEPARATOR || "._-+:,@%".contains(c);
+    if text.chars().all(is_plain) { text } else { format!("'{}'", text.replace('\'', r"'\''")) }
+}
+
 fn figures(
     found: &StackLens,
     listed: &Listed,
@@ -390,9 +407,8 @@ fn figures(
     let Stage { bin, pair_step, residual, .. } = stage;
     let range = optics.working_range();
     let range_mm = range.far_mm - range.near_mm;
-    let middle = plane.at(0.5 * size.0 as f64, 0.5 * size.1 as f64) - 0.5 * pair_step as f64;
-    let far = (middle.round().max(0.0) as usize).min(files.len().saturating_sub(pair_step + 1));
-    let out = request.out.display();
+    let far = telling_pair(plane.at(0.5 * size.0 as f64, 0.5 * size.1 as f64), pair_step, files.len());
+    let out = shell_word(&request.out);
     let of_range = |mm: f64| rounded_for(range_mm, mm, 4);
     let of_error = |mm: f64| rounded_for(held_out.rms_mm, mm, 3);
     let next = match listed.lens {
@@ -401,8 +417,8 @@ fn figures(
             "take pairs {pair_step} slices ({} mm) apart, the far-focused image first (at any other distance depth is wrong \
              without a warning): farnear depth {} {} --optics {out}",
             of_range(range_mm),
-            files[far].display(),
-            files[far + pair_step].display()
+            shell_word(&files[far]),
+            shell_word(&files[far + pair_step])
         ),
     };
     StackFigures {

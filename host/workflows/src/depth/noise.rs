@@ -3,11 +3,11 @@
 use std::{fmt, str::FromStr};
 
 use farnear_depth::{corrections::Correction, pipeline::DepthMap, prepare::noise::PairNoise};
-use farnear_files::{image_file::Samples, quantiles::Quantiles};
+use farnear_files::image_file::Samples;
 use ndarray::{Array2, Zip};
 use serde::Serialize;
 
-use crate::{error::Result, figures::rounded_for};
+use crate::{error::Result, figures::rounded_for, quantile};
 
 /// Step for a correction's slope in parts of the correction's range: far above rounding, far below the curvature.
 const SLOPE_STEP: f64 = 0.02;
@@ -151,15 +151,11 @@ pub fn corrected(
             },
         );
     }
-    let quantiles = Quantiles::new(deviation.view());
-    let quantile = |part: f64| {
-        let last = quantiles.finite().saturating_sub(1);
-        let deviation = quantiles.at((part * last as f64).round() as usize).map_or(f64::NAN, f64::from);
+    let [median_sd_mm, p95_sd_mm] = [0.5, 0.95].map(|part| {
+        let deviation = quantile::of_map(deviation.view(), part).unwrap_or(f64::NAN);
         rounded_for(deviation, deviation, 4)
-    };
-    let found =
-        Uncertainty { noise: noise.to_string(), median_sd_mm: quantile(0.5), p95_sd_mm: quantile(0.95) };
-    Ok((deviation, found))
+    });
+    Ok((deviation, Uncertainty { noise: noise.to_string(), median_sd_mm, p95_sd_mm }))
 }
 
 #[cfg(test)]

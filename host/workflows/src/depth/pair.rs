@@ -44,10 +44,6 @@ impl Pair {
                 )));
             }
         };
-        if is_same(&far_image.pixels, &near_image.pixels) {
-            let twice = "they hold the same image: depth needs one focused far and one focused near";
-            return Err(unfit(twice.into()));
-        }
         let white = white.unwrap_or(1.0);
         let of_files = 0.5 * (far_image.coding_variance + near_image.coding_variance);
         // A capture's pictures are PNG; its record tells what the camera gave.
@@ -64,12 +60,6 @@ impl Pair {
             samples,
         })
     }
-}
-
-/// Whether all pixels are alike; NaN (transparent) is alike NaN.
-fn is_same(far: &Array2<f32>, near: &Array2<f32>) -> bool {
-    let alike = |(a, b): (&f32, &f32)| a == b || a.is_nan() && b.is_nan();
-    far.dim() == near.dim() && far.iter().zip(near).all(alike)
 }
 
 /// Warns if the file names contradict their order, because a swapped pair gives a plausible mirrored map.
@@ -106,14 +96,6 @@ mod tests {
     use farnear_files::image_file::encode_png;
 
     use super::*;
-
-    #[test]
-    fn an_image_with_transparent_pixels_is_the_same_as_itself() {
-        let image = ndarray::array![[f32::NAN, 0.5]];
-        assert!(is_same(&image, &image));
-        assert!(!is_same(&image, &ndarray::array![[0.5, 0.5]]));
-        assert!(!is_same(&image, &ndarray::array![[f32::NAN], [0.5]]));
-    }
 
     /// A capture keeps the pictures of a JPEG camera as PNG, which has no quantisation tables.
     #[test]

@@ -15,8 +15,22 @@ const BLACK: f32 = 8.0;
 /// Largest step of the codes that count.
 const CODE_STEP: f32 = 1.0 / 255.0;
 
+/// Next to the border of a registration the second pixel has at least half of the brightness of those behind it. The edge of an
+/// object in front of black is defocused in most images.
+const HALF: f32 = 0.5;
+const BEYOND_PX: usize = 12;
+
 /// Above, below, left and right.
 pub(super) type Sides = [bool; 4];
+
+/// How an image begins behind each black border.
+pub(super) type Borders = [Option<Edge>; 4];
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Edge {
+    Abrupt,
+    Gradual,
+}
 const SIDES: [(bool, bool); 4] = [(false, false), (false, true), (true, false), (true, true)];
 
 /// The image as seen from a side: its border is above.
@@ -33,14 +47,28 @@ fn from_side(
     image
 }
 
-/// Sides on which some of the images have a black border, from those of each. One that all have is the scene's.
-pub(super) fn of_some(images: &[Sides]) -> Sides {
-    std::array::from_fn(|side| !images.iter().all(|sides| sides[side]))
+/// Sides on which black borders are no part of the scene, from those of each image. One that all images have and that is
+/// gradual in most is the scene's.
+pub(super) fn of_registration(images: &[Borders]) -> Sides {
+    std::array::from_fn(|side| {
+        let abrupt = images.iter().filter(|sides| sides[side] == Some(Edge::Abrupt)).count();
+        images.iter().any(|sides| sides[side].is_none()) || 2 * abrupt > images.len()
+    })
 }
 
-/// Sides with a black border. `code_step` is that of integers from 0 to 1, and 0 for floats, whose borders are zeros.
-pub(super) fn sides(image: &mut Array2<f32>, code_step: f32) -> Sides {
-    SIDES.map(|side| !borders(&from_side(image.view_mut(), side), code_step).is_empty())
+/// Black borders. `code_step` is that of integers from 0 to 1, and 0 for floats, whose borders are zeros.
+pub(super) fn of_image(image: &mut Array2<f32>, code_step: f32) -> Borders {
+    SIDES.map(|side| {
+        let image = from_side(image.view_mut(), side);
+        let borders = borders(&image, code_step);
+        let abrupt = borders.iter().filter(|(column, depth)| {
+            let column = image.column(*column);
+            let mut beyond = column.iter().skip(depth + 1).take(BEYOND_PX);
+            beyond.next().is_some_and(|second| *second >= HALF * beyond.sum::<f32>() / (BEYOND_PX - 1) as f32)
+        });
+        let edge = if 2 * abrupt.count() > borders.len() { Edge::Abrupt } else { Edge::Gradual };
+        (!borders.is_empty()).then_some(edge)
+    })
 }
 
 /// Makes black borders on these sides NaN. Returns whether there are any.
@@ -111,9 +139,9 @@ mod tests {
         let dark = |y: usize, x: usize| ((y * 31 + x * 17 + y * x) % 9) as f32 * code_step;
         let mut image =
             Array2::from_shape_fn((120, 160), |(y, x)| if black(y, x) { dark(y, x) } else { 0.5 });
-        let expected = sides(&mut image, code_step);
+        let expected = of_image(&mut image, code_step);
         let found = erase(&mut image, code_step, [true; 4]);
-        assert_eq!(found, expected.contains(&true));
+        assert_eq!(found, expected.iter().any(Option::is_some));
         (found, image.mapv(f32::is_nan))
     }
 
@@ -166,19 +194,24 @@ mod tests {
         }
     }
 
-    /// A straight object on a black background.
+    /// A straight object on a black background, and registered images none of which is whole.
     #[test]
-    fn a_border_that_all_images_have_is_the_scenes() {
-        let image = |left: usize, right: usize| {
-            let columns = left..160 - right;
-            Array2::from_shape_fn((120, 160), |(_, x)| if columns.contains(&x) { 0.5 } else { 0.0 })
+    fn a_gradual_border_that_all_images_have_is_the_scenes() {
+        let image = |left: usize, right: usize, blur: f32| {
+            let ramp = |x: usize| (0.5 * (x as f32 - left as f32) / blur).clamp(0.0, 0.5);
+            Array2::from_shape_fn((120, 160), |(_, x)| if x < 160 - right { ramp(x + 1) } else { 0.0 })
         };
-        let mut images = [image(20, 0), image(25, 7), image(22, 0)];
-        let found: Vec<Sides> = images.iter_mut().map(|image| sides(image, CODE_STEP)).collect();
-        let erased = of_some(&found);
+        let of = |images: &mut [Array2<f32>]| {
+            let found: Vec<Borders> = images.iter_mut().map(|image| of_image(image, CODE_STEP)).collect();
+            (of_registration(&found), found)
+        };
+        let mut images = [image(20, 0, 25.0), image(25, 7, 1.0), image(22, 0, 40.0)];
+        let (erased, found) = of(&mut images);
         assert!(!erased[2] && erased[3], "{found:?}");
         let bordered: Vec<bool> = images.iter_mut().map(|image| erase(image, CODE_STEP, erased)).collect();
         assert_eq!(bordered, [false, true, false]);
         assert!(images[1][(50, 5)] == 0.0 && images[1][(50, 155)].is_nan());
+        let mut registered = [image(20, 0, 1.0), image(25, 0, 1.0), image(22, 0, 2.0)];
+        assert!(of(&mut registered).0[2]);
     }
 }

@@ -26,7 +26,7 @@ use ndarray::{Array2, ArrayView2, CowArray, Ix2};
 
 use super::{
     FocusStackRequest,
-    black_border::{self, Sides},
+    black_border::{self, Borders},
 };
 use crate::{
     context::Context,
@@ -149,7 +149,7 @@ impl<'a> Images<'a> {
             };
             read.code_step = read.code_step.max(code_step);
             without_value += image.pixels.iter().filter(|value| !value.is_finite()).count();
-            black.push((black_border::sides(&mut image.pixels, code_step), code_step));
+            black.push((black_border::of_image(&mut image.pixels, code_step), code_step));
             read.specks.push(fill_specks(&mut image.pixels));
             read.images.push((end, image.pixels.dim()));
             read.write(index, image.pixels.view())?;
@@ -177,11 +177,11 @@ impl<'a> Images<'a> {
     }
 
     /// Erases the black borders of images, from their sides and the steps of their codes.
-    fn erase_black(&mut self, black: &[(Sides, f32)]) -> Result<()> {
-        let sides: Vec<Sides> = black.iter().map(|(sides, _)| *sides).collect();
-        let erased = black_border::of_some(&sides);
-        for (index, (sides, code_step)) in black.iter().enumerate() {
-            let sides: Sides = std::array::from_fn(|side| sides[side] && erased[side]);
+    fn erase_black(&mut self, black: &[(Borders, f32)]) -> Result<()> {
+        let borders: Vec<Borders> = black.iter().map(|(borders, _)| *borders).collect();
+        let erased = black_border::of_registration(&borders);
+        for (index, (borders, code_step)) in black.iter().enumerate() {
+            let sides = std::array::from_fn(|side| borders[side].is_some() && erased[side]);
             let mut bordered = false;
             if sides.contains(&true) {
                 let mut image = self.stored(index, 0..self.dim(index).0)?;

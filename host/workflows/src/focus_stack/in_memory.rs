@@ -10,7 +10,7 @@ use farnear_depth::{
 use ndarray::{Array2, ArrayView2};
 
 use super::{
-    black_border::{self, Sides},
+    black_border::{self, Borders},
     frames,
     images::{darkest, even, fill_specks, mark_specks},
     withhold,
@@ -53,9 +53,10 @@ pub fn prepare_stack(
     use_all: bool,
     context: &Context<'_>,
 ) -> Result<PreparedStack> {
-    let sides: Vec<Sides> = images.iter_mut().map(|image| black_border::sides(image, code_step)).collect();
+    let borders: Vec<Borders> =
+        images.iter_mut().map(|image| black_border::of_image(image, code_step)).collect();
     let mut specks: Vec<_> = images.iter_mut().map(fill_specks).collect();
-    let erased = black_border::of_some(&sides);
+    let erased = black_border::of_registration(&borders);
     for image in &mut images {
         black_border::erase(image, code_step, erased);
     }

@@ -6,7 +6,10 @@ use ndarray::{Array2, Zip};
 use serde::{Serialize, Serializer};
 
 use super::{Entries, MapFile, Unit, read_map};
-use crate::{context::Context, error::WorkflowError};
+use crate::{context::Context, error::WorkflowError, figures::rounded_for, quantile};
+
+/// Least ratio of depths in different units: centimetres and millimetres differ by 10.
+const OTHER_UNIT: f64 = 5.0;
 
 /// In the unit of the maps.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -37,16 +40,47 @@ pub fn difference(
     second: &Path,
     context: &Context<'_>,
 ) -> crate::Result<(Array2<f32>, DifferenceFigures)> {
-    let [first, second] = [read_map(first)?, read_map(second)?];
-    let unit = shared_unit("second", &first, &second)?;
-    let mut remarks = Vec::new();
-    let [first, second] = [first, second].map(|map| map.depth(unit, &mut remarks));
-    remarks.iter().for_each(|remark| context.progress.warn(remark));
+    let ([first, second], unit) = read_two("second", [first, second], context)?;
     of_maps(&first, &second, unit)
 }
 
+/// Two maps of one part of the images, in one unit. Warns if that is unknown or seems to be another one.
+pub(crate) fn read_two(
+    name: &'static str,
+    [first, second]: [&Path; 2],
+    context: &Context<'_>,
+) -> crate::Result<([Array2<f32>; 2], Unit)> {
+    let maps = [read_map(first)?, read_map(second)?];
+    let unit = shared_unit(name, &maps[0], &maps[1])?;
+    // A map without a record adopts the other's unit.
+    let mut remarks: Vec<String> = maps.iter().filter_map(MapFile::taken_as_mm).collect();
+    let unknown = remarks.len();
+    if unknown < maps.len() {
+        remarks.clear();
+    }
+    let maps = maps.map(|map| map.depth(unit, &mut remarks));
+    if unknown > 0 {
+        remarks.extend(of_other_unit(&maps));
+    }
+    remarks.iter().for_each(|remark| context.progress.warn(remark));
+    Ok((maps, unit))
+}
+
+fn of_other_unit(maps: &[Array2<f32>; 2]) -> Option<String> {
+    // Positions may have any sign.
+    let size = |map: &Array2<f32>| quantile::of_map(map.mapv(f32::abs).view(), 0.5);
+    let [first, second] = [size(&maps[0])?, size(&maps[1])?];
+    (first.max(second) > OTHER_UNIT * first.min(second)).then(|| {
+        let [first, second] = [first, second].map(|size| rounded_for(size, size, 3));
+        format!(
+            "the median of the first map's depths is {first}, of the second's {second}: is one of them in another unit, or counted \
+             from another zero?"
+        )
+    })
+}
+
 /// The unit of two maps of one part of the images; a map without a record adopts the other's.
-pub(crate) fn shared_unit(name: &'static str, first: &MapFile, second: &MapFile) -> crate::Result<Unit> {
+fn shared_unit(name: &'static str, first: &MapFile, second: &MapFile) -> crate::Result<Unit> {
     if let (Some(a), Some(b)) = (first.part, second.part)
         && a != b
     {
@@ -97,6 +131,7 @@ mod tests {
     use ndarray::array;
 
     use super::*;
+    use crate::context::{Cancel, Progress, Unattended};
 
     #[test]
     fn maps_of_two_regions_have_no_difference() {
@@ -130,6 +165,50 @@ mod tests {
         assert!(error.is_usage());
         let expected = "truth (in numbers of images): the first map is in mm, and both must have one unit";
         assert_eq!(error.to_string(), expected);
+    }
+
+    #[test]
+    fn an_unknown_unit_and_one_that_seems_to_be_another_are_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let map = |name: &str, depth: f32| {
+            let map = folder.path().join(name);
+            let depth = Array2::from_shape_fn((4, 6), |(y, x)| depth * (1.0 + 0.01 * (x + y) as f32));
+            std::fs::create_dir_all(map.parent().unwrap()).unwrap();
+            std::fs::write(&map, farnear_files::npy::write(depth.view())).unwrap();
+            map
+        };
+        let [mm, cm, m] = [("mm.npy", 900.0), ("cm.npy", 90.0), ("m.npy", 0.9)].map(|(name, z)| map(name, z));
+        let known = map("known/depth.npy", 900.0);
+        std::fs::write(known.with_file_name("stack.toml"), "unit = \"mm\"\n").unwrap();
+        for (first, second, unknown, other) in [
+            (&mm, &mm, 2, false),
+            (&mm, &m, 2, true),
+            (&cm, &mm, 2, true),
+            (&known, &mm, 0, false),
+            (&known, &m, 0, true),
+            (&cm, &known, 0, true),
+            (&known, &known, 0, false),
+        ] {
+            let heard = Heard::default();
+            let context = Context::new(&heard, &Unattended, Cancel::default());
+            difference(first, second, &context).unwrap();
+            let said = heard.0.lock().unwrap();
+            let count = |text: &str| said.iter().filter(|said| said.contains(text)).count();
+            assert_eq!(
+                (count("taken as mm"), count("in another unit")),
+                (unknown, usize::from(other)),
+                "{said:?}"
+            );
+        }
+    }
+
+    #[derive(Default)]
+    struct Heard(std::sync::Mutex<Vec<String>>);
+
+    impl Progress for Heard {
+        fn info(&self, what: &str) {
+            self.0.lock().unwrap().push(what.into());
+        }
     }
 
     #[test]

@@ -19,7 +19,7 @@ use crate::{
     depth::part::Part,
     error::{Result, WorkflowError},
     optics,
-    result_folder::{DEPTH_RECORD, STACK_RECORD},
+    result_folder::{self, DEPTH_RECORD, STACK_RECORD},
 };
 
 #[derive(Deserialize)]
@@ -54,6 +54,17 @@ pub(crate) struct MapFile {
 }
 
 impl MapFile {
+    /// A remark on a map whose unit is unknown.
+    pub fn taken_as_mm(&self) -> Option<String> {
+        self.unit.is_none().then(|| {
+            format!(
+                "the depths of {} are taken as mm: no depth.toml or stack.toml next to it states the unit of this file (they state that \
+                 of depth.npy, depth.tiff and depth.png)",
+                self.file.display()
+            )
+        })
+    }
+
     /// Depths in mm, as [`depth`](Self::depth). Fails for a map whose record states another unit.
     pub fn depth_mm(self, name: &'static str, remarks: &mut Vec<String>) -> Result<Array2<f32>> {
         match self.unit {
@@ -89,22 +100,31 @@ impl MapFile {
 }
 
 pub(crate) fn read_map(path: &Path) -> Result<MapFile> {
-    let (file, folder) = file_and_folder(path);
-    let record = record_of(&folder)?;
+    let (file, _, record) = with_record(path)?;
     values_of(&file, record.as_ref())
 }
 
-/// Whether a record states the unit of a map.
-pub(super) fn has_record(path: &Path) -> Result<bool> {
-    Ok(record_of(&file_and_folder(path).1)?.is_some())
+/// The file of a map, its folder, and the record there if it describes this file: another map, such as the true depth, may have another
+/// unit. Fails for a file of a result that is not its depth.
+fn with_record(path: &Path) -> Result<(PathBuf, PathBuf, Option<Record>)> {
+    let (file, folder) = file_and_folder(path);
+    let record = record_of(&folder)?;
+    if file.file_stem() == Some("depth".as_ref()) {
+        return Ok((file, folder, record));
+    }
+    if record.is_some() && result_folder::files().any(|name| file.file_name() == Some(name.as_ref())) {
+        let reason =
+            "it is another file of a result, whose depth is in depth.npy, depth.tiff or depth.png: name that";
+        return Err(WorkflowError::file(&file, "a depth map")(reason));
+    }
+    Ok((file, folder, None))
 }
 
 pub(super) fn read(path: &Path) -> Result<Measured> {
-    let (file, folder) = file_and_folder(path);
-    let record = record_of(&folder)?;
+    let (file, folder, record) = with_record(path)?;
     let map = values_of(&file, record.as_ref())?;
     let unit = map.unit.unwrap_or_default();
-    let mut remarks = Vec::new();
+    let mut remarks = Vec::from_iter(map.taken_as_mm());
     let depth = map.depth(unit, &mut remarks);
     let deviation = deviation_of(&file, &folder, depth.dim())?;
     let lateral = match &record {
@@ -206,6 +226,27 @@ mod tests {
         let found = |name: &str| read(&folder.path().join(name)).expect("a map").deviation;
         assert!(found("").is_some() && found("depth.npy").is_some());
         assert_eq!(found("truth.npy"), None);
+    }
+
+    #[test]
+    fn a_record_states_the_unit_of_the_depth_only() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let map = npy::write(Array2::from_elem((3, 4), 0.5).view());
+        for name in ["depth.npy", "truth.npy", "confidence.npy"] {
+            fs::write(folder.path().join(name), &map).expect("a writable folder");
+        }
+        let found = |name: &str| read(&folder.path().join(name));
+        // Of another program, without a record.
+        assert!(found("confidence.npy").expect("a map").remarks[0].contains("taken as mm"));
+        fs::write(folder.path().join(STACK_RECORD), "unit = \"um\"\n").expect("a writable folder");
+        for name in ["", "depth.npy"] {
+            let depth = found(name).expect("a map");
+            assert!(depth.unit == Unit::Um && depth.remarks.is_empty(), "{name}: {:?}", depth.remarks);
+        }
+        let truth = found("truth.npy").expect("a map");
+        assert!(truth.unit == Unit::Mm && truth.remarks[0].contains("truth.npy are taken as mm"));
+        let error = found("confidence.npy").expect_err("a reliability").to_string();
+        assert!(error.contains("confidence.npy") && error.contains("depth.npy"), "{error}");
     }
 
     #[test]

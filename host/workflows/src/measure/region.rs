@@ -2,6 +2,7 @@ use ndarray::{ArrayView2, s};
 use serde::{Serialize, Serializer};
 
 use super::{Entries, Measured, PlaneFigures, Rectangle, Unit};
+use crate::quantile;
 
 /// Side of blocks with independent means, px: wider than usual windows.
 const BLOCK_PX: usize = 24;
@@ -50,7 +51,7 @@ pub fn region(map: &Measured, at: Rectangle) -> crate::Result<RegionFigures> {
     map.check(&at)?;
     let Rectangle { x, y, width, height } = at;
     let window = s![y..y + height, x..x + width];
-    let mut depths: Vec<f64> =
+    let depths: Vec<f64> =
         map.depth.slice(window).iter().filter(|z| z.is_finite()).map(|z| f64::from(*z)).collect();
     let count = depths.len() as f64;
     let some = !depths.is_empty();
@@ -68,19 +69,13 @@ pub fn region(map: &Measured, at: Rectangle) -> crate::Result<RegionFigures> {
         fill_rate: count / (width * height) as f64,
         mean: some.then_some(mean),
         standard_error: standard_error(map.depth.slice(window)),
-        median: median(&mut depths),
+        median: quantile::of_map(map.depth.slice(window), 0.5),
         standard_deviation: some.then(|| variance.sqrt()),
         range: some
             .then(|| depths.iter().fold([f64::MAX, f64::MIN], |[low, high], z| [low.min(*z), high.max(*z)])),
         predicted_deviation: predicted,
         plane: PlaneFigures::of(map, at),
     })
-}
-
-/// The median; the upper one of two.
-fn median(values: &mut [f64]) -> Option<f64> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 fn standard_error(depths: ArrayView2<f32>) -> Option<f64> {
@@ -128,6 +123,13 @@ mod tests {
         let plane = found.plane.unwrap().plane;
         assert!((plane.slope_x - 0.397).abs() < 0.002, "{plane:?}");
         assert!(plane.rms_mm < 0.01, "{plane:?}");
+    }
+
+    #[test]
+    fn the_median_of_an_even_number_of_depths_is_between_the_middle_two() {
+        let depth = ndarray::array![[901.0, 907.0, f32::NAN, 902.0, 905.0]];
+        let map = Measured { depth, deviation: None, ..slanted() };
+        assert_eq!(region(&map, map.all()).unwrap().median, Some(903.5));
     }
 
     #[test]

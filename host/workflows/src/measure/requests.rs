@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 use serde_with::{DisplayFromStr, serde_as};
 
 use super::{
-    DifferenceFigures, Measured, PlaneFigures, ProfileFigures, Rectangle, RegionFigures, difference,
-    map_file, profile, region,
+    DifferenceFigures, Measured, PlaneFigures, ProfileFigures, Rectangle, RegionFigures, difference, profile,
+    region,
 };
 use crate::{
     context::Context,
@@ -15,10 +15,6 @@ use crate::{
 };
 
 fn read(map: &Path, context: &Context<'_>) -> Result<Measured> {
-    if !map_file::has_record(map)? {
-        let reason = "no depth.toml or stack.toml next to it states the unit";
-        context.progress.warn(&format!("the depths of {} are taken as mm: {reason}", map.display()));
-    }
     let map = Measured::read(map)?;
     map.remarks.iter().for_each(|remark| context.progress.warn(remark));
     Ok(map)

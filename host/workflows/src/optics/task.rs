@@ -109,6 +109,10 @@ impl Request for OpticsRequest {
                 return Err(WorkflowError::parameter(name, wrong, "a number above 0"));
             }
         }
+        if self.contrast > 1.0 {
+            let expected = "a part of the mean brightness, at most 1: 0.2 is 20 %";
+            return Err(WorkflowError::parameter("contrast", self.contrast, expected));
+        }
         match (&self.optics, self.distance_mm, self.range_mm) {
             (Some(_), None, _) => Ok(()),
             (None, Some(distance), Some(range)) if range < distance => Ok(()),
@@ -381,6 +385,19 @@ mod tests {
         assert!((0.2..0.33).contains(&found.whitened_mm), "{found:?}");
         let half = expected_error(&rig(2.703), 0.4, 1);
         assert!((half.ro_mm / found.ro_mm - 0.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_contrast_in_percent_is_refused() {
+        let request = |contrast| OpticsRequest {
+            contrast,
+            distance_mm: Some(300.0),
+            range_mm: Some(40.0),
+            ..OpticsRequest::default()
+        };
+        assert!(request(1.0).check().is_ok());
+        let error = request(20.0).check().unwrap_err();
+        assert!(error.is_usage() && error.to_string().starts_with("contrast 20: a part of"), "{error}");
     }
 
     #[test]

@@ -6,22 +6,12 @@ use farnear_files::EncodeError;
 use image::{ImageFormat, Rgb, RgbImage};
 use ndarray::ArrayView2;
 
-use crate::error::Result;
+use crate::{error::Result, quantile};
 
 const BINS: usize = 96;
 /// Floats have no more digits.
 const DECIMALS_MAX: f64 = 9.0;
 const NONE: Rgb<u8> = Rgb([150, 150, 152]);
-
-/// Quantile of the finite values; `None` without any.
-pub fn quantile(map: ArrayView2<f32>, part: f64) -> Option<f32> {
-    let mut finite: Vec<f32> = map.iter().copied().filter(|value| value.is_finite()).collect();
-    if finite.is_empty() {
-        return None;
-    }
-    let at = (part * (finite.len() - 1) as f64) as usize;
-    Some(*finite.select_nth_unstable_by(at, f32::total_cmp).1)
-}
 
 /// Decimals for values of a range of this width, at least `least`: steps of a tenth of the range differ.
 pub fn decimals(range: f64, least: usize) -> usize {
@@ -30,15 +20,15 @@ pub fn decimals(range: f64, least: usize) -> usize {
 }
 
 /// A map as PNG, from dark at `low` to bright at `high`.
-pub fn colours(map: ArrayView2<f32>, [low, high]: [f32; 2]) -> Result<Vec<u8>> {
+pub fn colours(map: ArrayView2<f32>, [low, high]: [f64; 2]) -> Result<Vec<u8>> {
     let (height, width) = map.dim();
-    let span = f64::from((high - low).max(f32::MIN_POSITIVE));
+    let span = (high - low).max(f64::MIN_POSITIVE);
     let picture = RgbImage::from_fn(width as u32, height as u32, |x, y| {
         let value = map[[y as usize, x as usize]];
         if !value.is_finite() {
             return NONE;
         }
-        let colour = colorous::VIRIDIS.eval_continuous((f64::from(value - low) / span).clamp(0.0, 1.0));
+        let colour = colorous::VIRIDIS.eval_continuous(((f64::from(value) - low) / span).clamp(0.0, 1.0));
         Rgb([colour.r, colour.g, colour.b])
     });
     let mut png = Cursor::new(Vec::new());
@@ -48,14 +38,14 @@ pub fn colours(map: ArrayView2<f32>, [low, high]: [f32; 2]) -> Result<Vec<u8>> {
 
 /// Histogram without the outer half percents, as SVG.
 pub fn histogram(depth: ArrayView2<f32>, unit: &str) -> String {
-    let (Some(low), Some(high)) = (quantile(depth, 0.005), quantile(depth, 0.995)) else {
+    let [Some(low), Some(high)] = [0.005, 0.995].map(|part| quantile::of_map(depth, part)) else {
         return "<p>no depth</p>".into();
     };
     let span = if high > low { high - low } else { 1e-3 };
-    let decimals = decimals(f64::from(span), 1);
+    let decimals = decimals(span, 1);
     let mut counts = [0u32; BINS];
-    for value in depth.iter().copied().filter(|value| (low..=high).contains(value)) {
-        let bin = ((value - low) / span * BINS as f32) as usize;
+    for value in depth.iter().map(|value| f64::from(*value)).filter(|value| (low..=high).contains(value)) {
+        let bin = ((value - low) / span * BINS as f64) as usize;
         counts[bin.min(BINS - 1)] += 1;
     }
     let most = f64::from(counts.iter().copied().max().unwrap_or(1).max(1));
@@ -81,6 +71,14 @@ mod tests {
     use ndarray::Array2;
 
     use super::*;
+
+    #[test]
+    fn the_histogram_of_a_small_map_shows_every_value() {
+        let map = Array2::from_shape_fn((2, 5), |(y, x)| (5 * y + x) as f32);
+        let plot = histogram(map.view(), "mm");
+        assert!(plot.contains(">0.0 mm<") && plot.contains(">9.0 mm<"), "{plot}");
+        assert_eq!(plot.matches("height=150.0").count(), 10, "{plot}");
+    }
 
     #[test]
     fn labels_of_a_small_range_differ() {

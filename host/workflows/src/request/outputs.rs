@@ -5,6 +5,7 @@ use std::{
     path::{Component, Path, PathBuf},
 };
 
+use farnear_files::staging::Staging;
 use serde_json::Value;
 
 use super::{PathKind, Request};
@@ -17,34 +18,67 @@ const PICTURES: [&str; 8] = ["png", "tif", "tiff", "jpg", "jpeg", "pgm", "bmp", 
 /// appears when it is complete, and no file may replace an input.
 pub fn check<R: Request>(request: &R) -> Result<()> {
     request.check()?;
-    // A path that is not UTF-8 is checked when it is written.
-    let Ok(Value::Object(fields)) = serde_json::to_value(request) else { return Ok(()) };
-    let outputs: Vec<(&'static str, PathKind, &str)> = R::PATHS
-        .iter()
-        .filter(|(_, kind)| matches!(kind, PathKind::OutputFile | PathKind::OutputFolder))
-        .filter_map(|(name, kind)| Some((*name, *kind, fields.get(*name)?.as_str()?)))
-        .filter(|(.., path)| !path.is_empty())
-        .collect();
-    for (index, &(name, _, path)) in outputs.iter().enumerate() {
+    let outputs = outputs(request);
+    for (index, (name, _, path)) in outputs.iter().enumerate() {
         for (other, _, taken) in &outputs[..index] {
             let current = WorkflowError::read("the current folder", Path::new("."));
-            if overlap(path.as_ref(), taken.as_ref()).map_err(current)? {
+            if overlap(path, taken).map_err(current)? {
+                let taken = taken.display();
                 let expected =
                     format!("expected another place, neither inside {taken} ({other}) nor around it");
-                return Err(WorkflowError::parameter(name, path, expected));
+                return Err(WorkflowError::parameter(name, path.display(), expected));
             }
         }
     }
-    let files = outputs.iter().filter(|(_, kind, _)| *kind == PathKind::OutputFile);
     let current = std::env::current_dir().unwrap_or_default();
     let inputs = request.inputs();
-    for &(name, _, path) in files {
-        if let Some(input) = inputs.iter().find(|input| replaces(&current, path.as_ref(), input)) {
+    for (name, path) in files(&outputs) {
+        if let Some(input) = inputs.iter().find(|input| replaces(&current, path, input)) {
             let expected = format!("it would replace the input {}: name another file", input.display());
-            return Err(WorkflowError::parameter(name, path, expected));
+            return Err(WorkflowError::parameter(name, path.display(), expected));
         }
     }
     Ok(())
+}
+
+/// Checks before the work that each result file can be written after it. Not for batch, which makes folders itself.
+pub fn check_folders<R: Request>(request: &R) -> Result<()> {
+    files(&outputs(request)).try_for_each(|(name, path)| check_folder(name, path))
+}
+
+/// Checks that a file can be written to `path`.
+pub(crate) fn check_folder(name: &'static str, path: &Path) -> Result<()> {
+    let unusable = |expected: String| Err(WorkflowError::parameter(name, path.display(), expected));
+    let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+    let folder = parent.unwrap_or(Path::new("."));
+    if !folder.is_dir() {
+        return unusable(format!("there is no folder {}: make it, or name another place", folder.display()));
+    }
+    if path.is_dir() {
+        return unusable("it is a folder: name a file".into());
+    }
+    // Only writing shows that the folder can be written to.
+    Staging::into_folder(folder)?;
+    Ok(())
+}
+
+type Output = (&'static str, PathKind, PathBuf);
+
+/// Field, kind and place of each result.
+fn outputs<R: Request>(request: &R) -> Vec<Output> {
+    // A path that is not UTF-8 is checked when it is written.
+    let Ok(Value::Object(fields)) = serde_json::to_value(request) else { return Vec::new() };
+    R::PATHS
+        .iter()
+        .filter(|(_, kind)| matches!(kind, PathKind::OutputFile | PathKind::OutputFolder))
+        .filter_map(|(name, kind)| Some((*name, *kind, fields.get(*name)?.as_str()?.into())))
+        .filter(|(.., path): &Output| !path.as_os_str().is_empty())
+        .collect()
+}
+
+fn files(outputs: &[Output]) -> impl Iterator<Item = (&'static str, &Path)> {
+    let files = outputs.iter().filter(|(_, kind, _)| *kind == PathKind::OutputFile);
+    files.map(|(name, _, path)| (*name, path.as_path()))
 }
 
 /// Whether a file would replace an input, or a picture in a folder of inputs.
@@ -144,6 +178,27 @@ mod tests {
         {
             assert!(check(&sample(file, plot)).is_ok(), "{file} {plot}");
         }
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_written_is_refused_before_the_work() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let place = |name: &str| folder.path().join(name);
+        std::fs::create_dir(place("taken")).expect("a writable folder");
+        std::fs::write(place("file"), "").expect("a writable folder");
+        let sample = |plot: Option<PathBuf>| Sample { plot, ..Sample::default() };
+        for (plot, phrase) in [
+            ("nodir/x.svg", "nodir: make it, or name another place"),
+            ("file/x.svg", "there is no folder"),
+            ("taken", "it is a folder: name a file"),
+        ] {
+            let error = check_folders(&sample(Some(place(plot)))).expect_err("refused");
+            assert!(error.is_usage() && error.to_string().contains(phrase), "{error}");
+        }
+        for plot in [None, Some("x.svg".into()), Some(place("x.svg")), Some(place("file"))] {
+            assert!(check_folders(&sample(plot)).is_ok());
+        }
+        assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 2, "nothing is left behind");
     }
 
     #[test]

@@ -39,7 +39,8 @@ pub enum CameraAddress {
     Genicam(String),
 }
 
-pub const ADDRESSES: &str = "sim, HOST:PORT, folder:DIR, command:\"PROGRAM ...\", v4l:DEVICE or genicam:ID";
+/// Addresses other than `sim`.
+pub const OTHERS: &str = "HOST:PORT, folder:DIR, command:\"PROGRAM ...\", v4l:DEVICE or genicam:ID";
 
 impl FromStr for CameraAddress {
     type Err = WorkflowError;
@@ -58,7 +59,7 @@ impl FromStr for CameraAddress {
             Some(("genicam", id)) => Ok(Self::Genicam(id.into())),
             Some(_) => Ok(Self::Endpoint(text.into())),
             None if text == "genicam" => Ok(Self::Genicam(String::new())),
-            None => Err(WorkflowError::parameter("camera", text, format!("expected {ADDRESSES}"))),
+            None => Err(WorkflowError::parameter("camera", text, format!("expected sim, {OTHERS}"))),
         }
     }
 }
@@ -179,12 +180,13 @@ impl CameraSettings {
             (CameraAddress::Emulated, RigAddress::Open(open)) if !open.is_emulated() => {
                 Some(open.name().to_owned())
             }
-            (CameraAddress::Emulated, RigAddress::Attached) => Some("a board".into()),
+            (CameraAddress::Emulated, RigAddress::Attached) => Some("the board".into()),
             (CameraAddress::Emulated, RigAddress::Port(port)) => Some(port.to_string()),
             _ => None,
         };
         if let Some(rig) = other {
-            let expected = format!("{OF_THE_EMULATED_RIG}; {rig} needs one of {ADDRESSES} but sim");
+            let expected =
+                format!("{OF_THE_EMULATED_RIG} and is the default; name the camera of {rig}: {OTHERS}");
             return Err(WorkflowError::parameter("camera", "sim", expected));
         }
         if let Some(exposure) = self.settings.iter().find(|setting| matches!(setting, Setting::ExposureUs(_)))

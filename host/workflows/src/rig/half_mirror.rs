@@ -12,7 +12,7 @@ use ndarray::Axis;
 
 use super::{
     RigAddress,
-    camera::{ADDRESSES, CameraAddress, CameraSettings},
+    camera::{CameraAddress, CameraSettings, OTHERS},
     pair::{CaptureRequest, PairFigures, noted, warn_of_images},
 };
 use crate::{
@@ -94,7 +94,7 @@ fn second_address(settings: &CaptureRequest) -> Result<CameraAddress> {
             second(
                 "none",
                 format!(
-                    "a half mirror needs a second camera, which takes the near image: name one of {ADDRESSES} but sim; the emulated rig \
+                    "a half mirror needs a second camera, which takes the near image: name one of {OTHERS}; the emulated rig \
                  has two by itself"
                 ),
             )

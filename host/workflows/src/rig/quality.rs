@@ -22,6 +22,7 @@ use crate::{
     figures::rounded,
     measure::{Rectangle, fit},
     optics::GivenOptics,
+    quantile,
     request::{PathKind, Request},
     text_file,
 };
@@ -155,12 +156,6 @@ pub fn measure(request: &QualityRequest, context: &Context<'_>) -> Result<Qualit
     request.check()?;
     let optics = GivenOptics::read(&request.optics)?;
     let mut record = read_record(&request.record)?;
-    if let Some(folder) =
-        request.record.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.is_dir())
-    {
-        let expected = format!("the folder {} does not exist: make it first", folder.display());
-        return Err(WorkflowError::parameter("record", request.record.display(), expected));
-    }
     let method = DepthMethod::Whitened;
     let computation = MeasureSettings { window: method.usual_window(), ..MeasureSettings::default() };
     let mut rig = request.camera.connect(&request.rig, Some(&optics), context)?;
@@ -227,9 +222,7 @@ fn figures(
             "expected a textured plane within the working range",
         )
     })?;
-    let predicted = predicted.map(|map| {
-        map.slice(window).iter().filter(|value| value.is_finite()).map(|value| f64::from(*value)).collect()
-    });
+    let predicted = predicted.and_then(|map| quantile::of_map(map.slice(window), 0.5));
     Ok(QualityFigures {
         time: None,
         pairs: maps.len(),
@@ -237,8 +230,8 @@ fn figures(
         mean_mm: rounded(plane.z_mm, 4),
         plane_rms_mm: rounded(plane.rms_mm, 4),
         tilt_deg: rounded(plane.tilt_deg, 3),
-        temporal_noise_mm: rounded(median(noise), 4),
-        predicted_noise_mm: rounded(median(predicted.unwrap_or_default()), 4),
+        temporal_noise_mm: rounded(quantile::of_values(noise, 0.5).unwrap_or_default(), 4),
+        predicted_noise_mm: rounded(predicted.unwrap_or_default(), 4),
         accuracy_mm: true_mm.map(|true_mm| rounded(plane.z_mm - true_mm, 4)),
     })
 }
@@ -249,15 +242,6 @@ fn spread(values: &[f64]) -> (f64, f64) {
     let mean = values.iter().sum::<f64>() / count;
     let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
     (mean, (squares / (count - 1.0)).sqrt())
-}
-
-/// The median; 0 without values.
-fn median(mut values: Vec<f64>) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 #[cfg(test)]

@@ -28,6 +28,7 @@ use crate::{
     error::{Result, WorkflowError},
     figures::rounded,
     optics::{GivenOptics, another_size},
+    quantile,
 };
 
 const MAGIC: &[u8; 8] = b"FNPAIRS1";
@@ -281,13 +282,12 @@ pub fn play(
         }
         Ok::<_, WorkflowError>(())
     })?;
-    latencies_ms.sort_by(f64::total_cmp);
     let pairs = latencies_ms.len();
     Ok(PlayFigures {
         pairs,
         unrelated_pairs,
         maps_per_second: rounded(pairs as f64 / begin.elapsed().as_secs_f64().max(1e-9), 2),
-        latency_ms: rounded(latencies_ms.get(pairs / 2).copied().unwrap_or_default(), 2),
+        latency_ms: rounded(quantile::of_values(latencies_ms, 0.5).unwrap_or_default(), 2),
         seconds: rounded(seconds, 3),
     })
 }

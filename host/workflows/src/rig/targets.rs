@@ -10,6 +10,7 @@ use farnear_depth::{
     operators::Operators,
     optics::Optics,
     pipeline::{Settings, depth_from_pair},
+    validity::LARGEST_ALPHA,
 };
 use farnear_files::{npy, staging};
 use ndarray::Array2;
@@ -235,14 +236,16 @@ impl MeanSquare {
 }
 
 fn distances(asked_mm: &[f64], optics: &Optics) -> Result<Vec<f64>> {
-    if let Some(bad) = asked_mm.iter().find(|mm| !(mm.is_finite() && **mm > optics.focal_length_mm())) {
-        let expected = format!("expected mm beyond the focal length of {} mm", optics.focal_length_mm());
+    let range = optics.working_range();
+    let usable = |mm: f64| mm.is_finite() && optics.alpha(mm).abs() <= LARGEST_ALPHA;
+    if let Some(bad) = asked_mm.iter().find(|mm| !usable(**mm)) {
+        let expected =
+            format!("expected {:.1} to {:.1} mm, the range of the optics", range.near_mm, range.far_mm);
         return Err(WorkflowError::parameter("distances", bad, expected));
     }
     if !asked_mm.is_empty() {
         return Ok(asked_mm.to_vec());
     }
-    let range = optics.working_range();
     let step = (range.far_mm - range.near_mm) / (USUAL_TARGETS - 1) as f64;
     // Rounded to 0.1 mm, which can be set on a rail.
     Ok((0..USUAL_TARGETS).map(|i| rounded(range.near_mm + step * i as f64, 1)).collect())
@@ -276,6 +279,19 @@ fn read_list(path: &Path) -> Result<List> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn distances_outside_the_range_of_the_optics_are_refused() {
+        let optics = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n[focus]\nfar_mm = 933.0\nmax_blur_px = 2.703\n";
+        let optics = GivenOptics::parse(optics, Path::new("optics.toml")).unwrap().optics;
+        assert_eq!(distances(&[885.5, 935.0], &optics).unwrap(), [885.5, 935.0]);
+        for wrong in [40.0, 880.0, 2000.0, f64::NAN, f64::INFINITY] {
+            let error = distances(&[900.0, wrong], &optics).unwrap_err();
+            assert!(error.is_usage());
+            let error = error.to_string();
+            assert!(error.starts_with(&format!("distances {wrong}: expected 886.8 to 933.0 mm")), "{error}");
+        }
+    }
 
     #[test]
     fn a_target_that_was_not_listed_before_the_end_of_a_run_is_listed() {

@@ -327,6 +327,14 @@ impl ShadowRemoveRequest {
                 .map(LightSource::Lamp)
                 .map_err(|expected| WorkflowError::parameter("lamp", lamp, expected)),
             ([_], .., Some(degrees)) => Ok(LightSource::Direction { degrees }),
+            (["lat, lon and time"], ..) => {
+                let parts =
+                    [("lat", self.lat.is_some()), ("lon", self.lon.is_some()), ("time", self.time.is_some())];
+                let missing: Vec<&str> =
+                    parts.iter().filter_map(|(name, given)| (!given).then_some(*name)).collect();
+                let missing = format!("{} missing", missing.join(" and "));
+                Err(WorkflowError::parameter("sun", missing, "expected lat, lon and time"))
+            }
             ([], ..) => Err(wrong("none")),
             (names, ..) => Err(wrong(&names.join(" and "))),
         }

@@ -79,12 +79,9 @@ fn rejects_raw_files_with_a_remedy() {
     assert!(preview.contains("preview of 4x3 px") && preview.contains("develop"), "{preview}");
 }
 
-#[test]
-fn rejects_a_page_whose_image_is_in_a_sub_directory() {
-    let mut file = tiff(
-        CLASSIC,
-        &[Page::grey(2, 1, 8, vec![0; 2]).with(330, &[0]), Page::grey(400, 300, 8, vec![0; 9])],
-    );
+/// A file whose second page is in a sub-directory of the first.
+fn with_sub_image(page: Page, sub: Page) -> Vec<u8> {
+    let mut file = tiff(CLASSIC, &[page.with(330, &[0]), sub]);
     // Point tag 330 of the first directory to the second, and end the chain after the first.
     let word = |at: usize| u32::from_le_bytes(file[at..at + 4].try_into().unwrap()) as usize;
     let first = word(4);
@@ -96,8 +93,18 @@ fn rejects_a_page_whose_image_is_in_a_sub_directory() {
     file[entry + 2..entry + 4].copy_from_slice(&4_u16.to_le_bytes());
     file[entry + 8..entry + 12].copy_from_slice(&second.to_le_bytes());
     file[link..link + 4].fill(0);
-    let said = refusal(&file);
+    file
+}
+
+#[test]
+fn rejects_a_page_whose_image_is_in_a_sub_directory() {
+    let page = || Page::grey(2, 1, 8, vec![0; 2]);
+    let sub = Page::grey(400, 300, 8, vec![0; 9]);
+    let said = refusal(&with_sub_image(page(), sub.clone()));
     assert!(said.contains("preview of 2x1 px") && said.contains("400x300"), "{said}");
+    // A thumbnail may be larger than its image.
+    let thumbnail = sub.with(254, &[1]);
+    assert_eq!(decode_grey(&with_sub_image(page(), thumbnail)).unwrap().pixels.dim(), (1, 2));
 }
 
 #[test]
@@ -107,6 +114,15 @@ fn names_unsupported_formats() {
         (b"GIF89a\0\0", "GIF"),
         (b"RIFF\0\0\0\0WEBPVP8 ", "WebP"),
         (b"\xff\x0a\0\0", "JPEG XL"),
+        (b"\0\0\0\x18ftyphevx\0\0\0\0", "HEIC"),
+        (b"\0\0\0\x1cftypmif1\0\0\0\0mif1heic", "HEIC"),
+        (b"\0\0\0\x1cftypmif1\0\0\0\0mif1avif", "AVIF"),
+        (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "OLE"),
+        (b"\0\0\0\x03\0\0\x10\0\0\0\0\x01", "microscope"),
+        (b"NRRD0005\n", "NRRD"),
+        (b"SDPX\0\0", "DPX"),
+        (&[&[0_u8; 128][..], b"DICM"].concat(), "DICOM"),
+        (&[&[1_u8; 208][..], b"MAP DA\0\0"].concat(), "MRC"),
     ] {
         assert!(refusal(bytes).contains(name) && refusal(bytes).contains("convert"), "{name}");
     }
@@ -251,6 +267,53 @@ fn a_deep_pgm_has_the_scale_of_its_header() {
     assert!((pgm.pixels[(0, 0)] - 1.0).abs() < 1e-6 && (pgm.pixels[(0, 1)] - 0.5).abs() < 1e-3, "{pgm:?}");
 }
 
+#[test]
+fn a_white_level_is_a_code_of_the_file() {
+    let of = |bytes: &[u8], code| {
+        let settings = ReadSettings { white_level: Some(code), ..ReadSettings::default() };
+        decode(bytes).unwrap().grey(&settings).map(|image| image.white_level.unwrap())
+    };
+    let mut png = Vec::new();
+    let mut encoder = png::Encoder::new(&mut png, 2, 1);
+    encoder.set_depth(png::BitDepth::Four);
+    encoder.write_header().unwrap().write_image_data(&[0x1f]).unwrap();
+    for (bytes, largest) in [
+        (b"P5 2 1 4095\n\x0f\xff\x07\xff".as_slice(), 4095),
+        (b"P2 2 1 100\n100 50\n", 100),
+        (&png, 15),
+        (&tiff(CLASSIC, &[Page::grey(2, 1, 4, vec![0x1f])]), 15),
+        (&tiff(CLASSIC, &[Page::grey(2, 1, 8, vec![1, 2])]), 255),
+    ] {
+        assert_eq!(of(bytes, largest), Ok(1.0), "{largest}");
+        let half = of(bytes, largest / 2 + 1).unwrap();
+        assert!((half - 0.5).abs() < 0.04, "{largest}: {half}");
+        assert!(of(bytes, largest + 1).unwrap_err().contains(&format!("1 to {largest}")));
+    }
+}
+
+#[test]
+fn a_wrong_white_level_does_not_blame_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("far.png");
+    fs::write(&path, encode_png(ndarray::array![[1, 2]].view(), 8).unwrap()).unwrap();
+    let settings = ReadSettings { white_level: Some(4095), ..ReadSettings::default() };
+    let error = read_grey_with(&path, &settings).unwrap_err().to_string();
+    assert!(error.ends_with("far.png: a white level of 4095 is outside its codes, 1 to 255"), "{error}");
+}
+
+#[test]
+fn pixels_that_a_bmp_skips_have_its_first_colour() {
+    let palette = [[9, 6, 3, 0], [90, 60, 30, 0], [255, 255, 255, 0]];
+    // Two pixels of colour 1; one skipped, one of colour 2, end of the row; the rest skipped.
+    let runs = [2, 1, 0, 2, 1, 0, 1, 2, 0, 0, 0, 1];
+    let header = [40, 5, 2, 1 | 8 << 16, 1, runs.len() as u32, 0, 0, 3, 0].map(u32::to_le_bytes).concat();
+    let begin = 14 + 40 + 12;
+    let file = [begin + runs.len() as u32, 0, begin].map(u32::to_le_bytes).concat();
+    let bytes = [b"BM".as_slice(), &file, &header, palette.as_flattened(), &runs].concat();
+    let pixels = decode_grey(&bytes).unwrap().pixels.mapv(|value| (255.0 * value).round());
+    assert_eq!(pixels, ndarray::array![[6.0, 6.0, 6.0, 6.0, 6.0], [60.0, 60.0, 6.0, 255.0, 6.0]]);
+}
+
 /// Mean of the squared steps of T.81, table K.1, over 0.08 to 0.3 cycles per pixel, a twelfth of it: 39.88.
 #[test]
 fn quantisation_tables_give_the_error_of_a_jpeg() {
@@ -284,6 +347,8 @@ fn other_programs_files_are_refused_by_format() {
         (b"Pf\n2 1\n-1.0\n", "PFM"),
         (b"PIEH\x02\0\0\0", ".dpt"),
         (b"DIGITAL SURF", ".sur"),
+        (b"8BPS\0\x01", "save it as PNG"),
+        (b"version https://git-lfs.github.com/spec/v1\n", "git lfs pull"),
     ] {
         let error = decode_grey(head).unwrap_err();
         assert!(error.contains(phrase), "{error}");

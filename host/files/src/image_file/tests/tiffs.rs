@@ -23,6 +23,54 @@ fn both_byte_orders_and_big_tiff_are_read() {
 }
 
 #[test]
+fn palettes_are_read_as_their_colours() {
+    let ramp = |shift: u16| (0..3 * 256).map(|at| at % 256 * shift).collect::<Vec<u16>>();
+    for (little, big) in [(true, false), (false, false), (true, true), (false, true)] {
+        for shift in [1, 256, 257] {
+            let page = Page::grey(2, 1, 8, vec![7, 200]).with(262, &[3]).with(320, &ramp(shift));
+            let bytes = tiff(Layout { little, big }, &[page]);
+            assert_eq!(read(&bytes), array![[7.0, 200.0]], "{little} {big} {shift}");
+            assert!(!decode_grey(&bytes).unwrap().colour);
+        }
+    }
+    let mut colours = [0_u16; 3 * 16];
+    [colours[2], colours[16 + 2], colours[32 + 2]] = [60 << 8, 90 << 8, 120 << 8];
+    let page = Page::grey(3, 1, 4, vec![0x20, 0x20]).with(262, &[3]).with(320, &colours);
+    let bytes = tiff(CLASSIC, &[page]);
+    assert_eq!(read(&bytes), array![[90.0, 0.0, 90.0]]);
+    assert!(decode_grey(&bytes).unwrap().colour);
+}
+
+#[test]
+fn lzw_data_without_an_end_have_one_remedy() {
+    use tiff::encoder::{Compression, TiffEncoder, colortype::Gray8};
+    let pixels: Vec<u8> = (0..40 * 30).map(|i| (i * i % 251) as u8).collect();
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let mut file = TiffEncoder::new(&mut bytes).unwrap().with_compression(Compression::Lzw);
+    file.write_image::<Gray8>(40, 30, &pixels).unwrap();
+    let mut bytes = bytes.into_inner();
+    assert!(decode_grey(&bytes).is_ok());
+    // Half of the strip's bytes (tag 279).
+    let at = bytes.windows(4).rposition(|four| four == [23, 1, 4, 0]).unwrap() + 8;
+    let length = u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+    bytes[at..at + 4].copy_from_slice(&(length / 2).to_le_bytes());
+    let said = decode_grey(&bytes).unwrap_err();
+    assert!(said.contains("LZW data have no end") && !said.contains("tiffcp"), "{said}");
+}
+
+#[test]
+fn a_text_that_is_not_utf_8_is_latin_1() {
+    let unit = |letter: &[u8]| {
+        let page = Page { texts: vec![(270, "unit=~~m".into())], ..Page::grey(1, 1, 8, vec![7]) };
+        let mut bytes = tiff(CLASSIC, &[page]);
+        let at = bytes.windows(2).position(|two| two == b"~~").unwrap();
+        bytes[at..at + 2].copy_from_slice(letter);
+        tiff_tags::directories(&bytes[..]).unwrap()[0].description.clone().unwrap()
+    };
+    assert_eq!([unit(b"\xb5m"), unit("\u{b5}".as_bytes())], ["unit=\u{b5}mm", "unit=\u{b5}m"]);
+}
+
+#[test]
 fn planar_colour_is_read_plane_by_plane() {
     let planes = [[30_u8, 60], [60, 90], [90, 30]].map(Vec::from).to_vec();
     let page = Page { strips: planes, ..Page::grey(2, 1, 8, Vec::new()) };

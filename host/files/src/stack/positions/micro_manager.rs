@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Planes, moving};
+use super::{Planes, finite, moving};
 use crate::image_file::Page;
 
 /// Numbers of a page along an axis other than focus.
@@ -41,11 +41,10 @@ pub(super) fn planes(pages: &[Page]) -> Planes {
             .map(|page| number(page.directory.micro_manager.as_deref()?))
             .collect::<Option<Vec<f64>>>()
     };
-    let numeric = |text: &str| text.parse().ok();
-    let position = |json: &str| POSITIONS.iter().find_map(|key| value(json, key)).and_then(numeric);
+    let position = |json: &str| POSITIONS.iter().find_map(|key| finite(value(json, key)?));
     let positions_um = of_pages(&position).filter(|all| moving(all));
     let mut order: Vec<usize> = (0..pages.len()).collect();
-    let plane = |json: &str| axes(json).find(|(axis, _)| *axis == "z").and_then(|(_, z)| numeric(z));
+    let plane = |json: &str| axes(json).find(|(axis, _)| *axis == "z").and_then(|(_, z)| finite(z));
     if let Some(planes) = of_pages(&plane).filter(|_| positions_um.is_none()) {
         order.sort_by(|a, b| planes[*a].total_cmp(&planes[*b]));
     }
@@ -83,10 +82,12 @@ mod tests {
                 Some(format!("{{\"Slice\": 1, \"ZPositionUm\": {z}, \"Width\": 8}}"));
         }
         assert_eq!(positions(&pages), Ok(Some(vec![-1.0, 0.5, 2.0])));
-        for page in &mut pages {
-            page.directory.micro_manager = Some("{\"ZPositionUm\": 2.0}".into());
+        for same in ["2.0", "NaN", "\"NaN\""] {
+            for page in &mut pages {
+                page.directory.micro_manager = Some(format!("{{\"ZPositionUm\": {same}}}"));
+            }
+            assert_eq!(positions(&pages), Ok(None), "{same}");
         }
-        assert_eq!(positions(&pages), Ok(None));
     }
 
     fn described(texts: &[&str]) -> Vec<Page> {

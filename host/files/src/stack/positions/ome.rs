@@ -5,7 +5,7 @@ use std::{
     collections::{HashMap, HashSet},
 };
 
-use super::{Planes, moving, one_series, unit_um};
+use super::{Planes, even, finite, moving, one_series, step_um, unescaped, unit_um};
 use crate::image_file::Page;
 
 /// The first image of a file's OME-XML.
@@ -40,11 +40,12 @@ impl<'a> Metadata<'a> {
 
     fn length_um(&self, name: &str) -> Option<f64> {
         let unit = attribute(self.pixels(), &format!("{name}Unit")).map_or(Some(1.0), unit_um)?;
-        Some(attribute(self.pixels(), name)?.parse::<f64>().ok()? * unit)
+        Some(finite(attribute(self.pixels(), name)?)? * unit)
     }
 
-    pub fn pixel_um(&self) -> Option<f64> {
-        self.length_um("PhysicalSizeX")
+    /// Width and height of a pixel.
+    pub fn pixel_um(&self) -> [Option<f64>; 2] {
+        ["PhysicalSizeX", "PhysicalSizeY"].map(|name| self.length_um(name))
     }
 
     pub fn planes(&self, pages: &[Page]) -> Result<Planes, String> {
@@ -60,20 +61,20 @@ impl<'a> Metadata<'a> {
             ));
         }
         let order = self.order(pages)?;
-        let positions_um = if planes > 1 { self.positions_um(planes) } else { None };
-        Ok(Planes { pages: order, positions_um, remarks: Vec::new() })
+        let (positions_um, remark) = if planes > 1 { self.positions_um(planes) } else { (None, None) };
+        Ok(Planes { pages: order, positions_um, remarks: Vec::from_iter(remark) })
     }
 
     /// The planes of a focus series with one file each, from the names that `TiffData` has for them. `None` if the metadata are of
     /// one file. Fails for other names, channels and times.
     pub fn files(&self, names: &[String]) -> Result<Option<Planes>, String> {
-        let mut of_name: HashMap<&str, [usize; 3]> = HashMap::new();
+        let mut of_name: HashMap<String, [usize; 3]> = HashMap::new();
         let mut at = [0; 3];
         for tag in self.0.split("</Pixels").next().unwrap_or_default().split('<') {
             if tag.starts_with("TiffData") {
                 at = ["FirstZ", "FirstC", "FirstT"].map(|name| number(tag, name).unwrap_or(0));
             } else if let (true, Some(name)) = (tag.starts_with("UUID"), attribute(tag, "FileName")) {
-                of_name.insert(name, at);
+                of_name.insert(unescaped(name), at);
             }
         }
         if of_name.len() < 2 {
@@ -104,13 +105,14 @@ impl<'a> Metadata<'a> {
         }
         let mut pages: Vec<usize> = (0..names.len()).collect();
         pages.sort_by_key(|index| known[*index][0]);
-        let positions_um = self
-            .positions_um(count)
-            .map(|positions| pages.iter().map(|index| positions[known[*index][0]]).collect());
+        let (positions_um, of_positions) = self.positions_um(count);
+        let positions_um =
+            positions_um.map(|positions| pages.iter().map(|index| positions[known[*index][0]]).collect());
         let missing = count - names.len();
         let remark = (missing > 0)
             .then(|| format!("{missing} of {count} planes of the OME metadata are not in the folder"));
-        Ok(Some(Planes { pages, positions_um, remarks: Vec::from_iter(remark) }))
+        let remarks = remark.into_iter().chain(of_positions).collect();
+        Ok(Some(Planes { pages, positions_um, remarks }))
     }
 
     /// Index of the page of each plane, by the elements `TiffData`.
@@ -143,19 +145,33 @@ impl<'a> Metadata<'a> {
         Ok(of_planes.into_iter().flatten().collect())
     }
 
-    fn positions_um(&self, planes: usize) -> Option<Vec<f64>> {
-        let mut positions = vec![None; planes];
+    /// Positions in um, and a remark on those that are not used.
+    fn positions_um(&self, planes: usize) -> (Option<Vec<f64>>, Option<String>) {
+        let mut stated = vec![None; planes];
         for plane in self.within("Plane") {
-            let unit = attribute(plane, "PositionZUnit").map_or(Some(1.0), unit_um);
-            let z = attribute(plane, "PositionZ").and_then(|text| text.parse::<f64>().ok());
-            let at = number(plane, "TheZ").and_then(|at| positions.get_mut(at));
-            if let (Some(at), Some(unit), Some(z)) = (at, unit, z) {
-                *at = Some(z * unit);
+            let at = number(plane, "TheZ").and_then(|at| stated.get_mut(at));
+            if let (Some(at), Some(z)) = (at, attribute(plane, "PositionZ").and_then(finite)) {
+                *at = Some((z, attribute(plane, "PositionZUnit").unwrap_or("um")));
             }
         }
-        let stated = positions.into_iter().collect::<Option<Vec<f64>>>().filter(|all| moving(all));
-        let spacing = self.length_um("PhysicalSizeZ").filter(|um| um.is_finite() && *um != 0.0);
-        stated.or_else(|| spacing.map(|spacing| (0..planes).map(|plane| plane as f64 * spacing).collect()))
+        let stated = stated.into_iter().collect::<Option<Vec<(f64, &str)>>>().unwrap_or_default();
+        let unit = stated.first().map_or("um", |(_, unit)| *unit);
+        let in_um = stated.iter().map(|(z, unit)| Some(z * unit_um(unit)?)).collect::<Option<Vec<f64>>>();
+        if let Some(positions) = in_um.filter(|all| moving(all)) {
+            return (Some(positions), None);
+        }
+        if let Some(size) = attribute(self.pixels(), "PhysicalSizeZ") {
+            let (step, remark) = step_um(size, attribute(self.pixels(), "PhysicalSizeZUnit").unwrap_or("um"));
+            return (step.map(|step| even(step, planes)), remark);
+        }
+        let stated: Vec<f64> = stated.into_iter().map(|(z, _)| z).collect();
+        let remark = (unit_um(unit).is_none() && moving(&stated)).then(|| {
+            format!(
+                "the file states positions of the planes and no unit of length ({unit}): they are not used; set the unit \
+                 (PositionZUnit) and save it again"
+            )
+        });
+        (None, remark)
     }
 }
 
@@ -209,6 +225,38 @@ mod tests {
     }
 
     #[test]
+    fn positions_without_a_value_or_a_unit_are_not_used() {
+        let planes = |pixels: &str, positions: [&str; 2]| {
+            let planes = [0, 1].map(|z| format!("<Plane TheZ='{z}' PositionZ={}/>", positions[z])).concat();
+            let xml = format!("<OME><Image><Pixels SizeZ='2' {pixels}>{planes}</Pixels></Image></OME>");
+            let planes = of(&pages(2, &xml)).unwrap();
+            (planes.positions_um, planes.remarks.join(""))
+        };
+        let (even, none) = (Some(vec![0.0, 0.5]), String::new());
+        let in_frame = ["'1' PositionZUnit='reference frame'", "'2' PositionZUnit='reference frame'"];
+        for positions in [["'NaN'", "'NaN'"], ["'1'", "'inf'"], in_frame] {
+            assert_eq!(
+                planes("PhysicalSizeZ='0.5'", positions),
+                (even.clone(), none.clone()),
+                "{positions:?}"
+            );
+        }
+        let remark = |pixels: &str, positions: [&str; 2], part: &str| {
+            let (found, remark) = planes(pixels, positions);
+            assert!(found.is_none() && remark.contains(part), "{pixels} {positions:?}: {remark}");
+        };
+        remark("", in_frame, "(reference frame)");
+        remark("PhysicalSizeZ='0,5'", ["''", "''"], "(0,5)");
+        remark("PhysicalSizeZ='2' PhysicalSizeZUnit='pixel'", ["''", "''"], "(pixel)");
+        assert_eq!(
+            planes("PhysicalSizeZ='1' PhysicalSizeZUnit='pixel'", ["'1'", "'1'"]),
+            (None, none.clone())
+        );
+        let micro = "PhysicalSizeZ='0.5' PhysicalSizeZUnit='&#x00B5;m'";
+        assert_eq!(planes(micro, ["'1'", "'1'"]), (even, none));
+    }
+
+    #[test]
     fn tiff_data_give_the_order_of_pages() {
         let of_data = |data: &str| {
             let xml =
@@ -249,11 +297,12 @@ mod tests {
             let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
             Metadata::of(xml).unwrap().files(&names)
         };
-        let all = ome(&[data(2, 0, "a1"), data(0, 0, "a2"), data(3, 0, "a3"), data(1, 1, "b1")].concat());
-        let found = of(&all, &["a1", "a2", "a3"]).unwrap().unwrap();
+        let all =
+            ome(&[data(2, 0, "a1"), data(0, 0, "a&amp;2"), data(3, 0, "a3"), data(1, 1, "b1")].concat());
+        let found = of(&all, &["a1", "a&2", "a3"]).unwrap().unwrap();
         assert_eq!((found.pages, found.positions_um), (vec![1, 0, 2], Some(vec![0.0, 4.0, 6.0])));
         assert!(found.remarks[0].contains("1 of 4 planes"), "{:?}", found.remarks);
-        assert!(of(&all, &["a1", "a2", "b1"]).unwrap_err().contains("2 channels"));
+        assert!(of(&all, &["a1", "a&2", "b1"]).unwrap_err().contains("2 channels"));
         assert!(of(&all, &["a1", "z9"]).unwrap_err().contains("without z9"));
         let twice = ome(&[data(2, 0, "a1"), data(2, 0, "a2")].concat());
         assert!(of(&twice, &["a1", "a2"]).unwrap_err().contains("one plane"));
@@ -266,7 +315,7 @@ mod tests {
                    <ome:TiffData FirstZ='1'/><ome:TiffData FirstZ='0' IFD='1'/></ome:Pixels></ome:Image></ome:OME>";
         let planes = of(&pages(2, &xml.replace("FirstZ='1'/", "FirstZ='1' IFD='0'/"))).unwrap();
         assert_eq!((planes.pages, planes.positions_um), (vec![1, 0], Some(vec![0.0, 1.5])));
-        assert_eq!(object_pixel_um(&pages(2, xml)), Some(3.0));
+        assert_eq!(object_pixel_um(&pages(2, xml)), (Some(3.0), None));
         assert!(of(&pages(2, &xml.replace("SizeC='1'", "SizeC='2'"))).unwrap_err().contains("2 channels"));
     }
 }

@@ -1,6 +1,40 @@
 use super::*;
 
 #[test]
+fn the_pair_to_try_has_the_target_off_the_middle_of_its_range() {
+    for (focus, pair_step, slices) in [(10.0, 10, 21), (6.2, 4, 13), (2.0, 4, 13), (10.5, 3, 13)] {
+        let far = telling_pair(focus, pair_step, slices);
+        let alpha = 2.0 * (focus - far as f64) / pair_step as f64 - 1.0;
+        assert!(far + pair_step < slices && (0.2..0.8).contains(&alpha.abs()), "{focus} {pair_step}: {far}");
+    }
+}
+
+#[test]
+fn a_path_in_a_command_is_one_word() {
+    for (path, word) in [
+        ("slices/05.png", "slices/05.png"),
+        ("sl mit (Klammer)/05.png", "'sl mit (Klammer)/05.png'"),
+        ("it's", r"'it'\''s'"),
+        ("größe/$x", "'größe/$x'"),
+    ] {
+        assert_eq!(shell_word(Path::new(path)), word);
+    }
+}
+
+#[test]
+fn a_gap_is_named_by_the_slices_on_its_sides() {
+    let folder = tempfile::tempdir().unwrap();
+    for number in (1..8_u8).chain(18..25) {
+        std::fs::write(folder.path().join(format!("{number:02}.png")), [number]).unwrap();
+    }
+    let stack = folder.path().to_path_buf();
+    let request = CalibrateStackRequest { stack, step_mm: Some(0.1), ..CalibrateStackRequest::default() };
+    let error = Listed::of(&request).err().unwrap().to_string();
+    let phrases = ["at least one is missing between", "07.png", "18.png"];
+    assert!(phrases.iter().all(|phrase| error.contains(phrase)), "{error}");
+}
+
+#[test]
 fn a_given_step_unlike_the_stated_one_has_a_remark() {
     assert_eq!(contradiction(0.1, None), None);
     assert_eq!(contradiction(0.1, Some(Ok(101.0))), None);

@@ -26,6 +26,21 @@ fn flags(folder: &Path, frame: usize) -> String {
 }
 
 #[test]
+fn a_sun_without_place_or_time_names_what_is_missing() {
+    let noon = || Some("2014-06-23T11:30:00Z".to_string());
+    let sun = |lat, lon, time| ShadowRemoveRequest { lat, lon, time, ..ShadowRemoveRequest::default() };
+    for (request, missing) in [
+        (sun(Some(52.38), None, noon()), "sun lon missing: expected lat, lon and time"),
+        (sun(None, Some(-1.56), noon()), "sun lat missing"),
+        (sun(Some(52.38), None, None), "sun lon and time missing"),
+        (ShadowRemoveRequest { lamp: Some("0,6,3".into()), ..sun(Some(52.38), None, None) }, "one of"),
+    ] {
+        let error = request.check().unwrap_err().to_string();
+        assert!(error.contains(missing), "{error}");
+    }
+}
+
+#[test]
 fn a_sun_that_sets_is_flagged_after_the_first_mask() {
     let folder = tempfile::tempdir().unwrap();
     let request = ShadowRemoveRequest {
