@@ -63,7 +63,7 @@ const OTHERS: [(usize, &[u8], &str); 34] = [
     (
         0,
         b"version https://git-lfs.github.com/spec/",
-        "it is a pointer of Git LFS in place of the file: fetch the file with `git lfs pull`",
+        "it is a Git LFS pointer, not the file: fetch the file with `git lfs pull`",
     ),
 ];
 

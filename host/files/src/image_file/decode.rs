@@ -187,7 +187,7 @@ fn other(bytes: &[u8]) -> Result<(Decoded, u8), String> {
 }
 
 impl Decoded {
-    /// Fails for a white level that is no code of the file.
+    /// Fails for a white level outside the codes of the file.
     pub(crate) fn grey(self, settings: &ReadSettings) -> Result<GreyImage, String> {
         let of_file = if let Values::U16(codes) = &self.values {
             settings

@@ -88,7 +88,7 @@ fn step_um(stated: &str, unit: &str) -> (Option<f64>, Option<String>) {
         return (None, Some(remark));
     };
     let um = unit_um(unit);
-    // Without a unit, 1 is no statement.
+    // Without a unit, 1 is the default.
     let remark = (um.is_none() && step != 1.0).then(|| {
         format!("the file states a spacing of the planes ({step}) and no unit of length ({unit}): {SET}")
     });

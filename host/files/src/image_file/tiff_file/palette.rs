@@ -18,7 +18,7 @@ pub(super) fn is_read(page: &Directory) -> bool {
         && page.colour_map.len() == 3 << page.bits
 }
 
-/// A file whose page has grey in place of a palette.
+/// A file whose palette page reads as grey.
 pub(super) struct AsGrey<R> {
     file: R,
     at: u64,

@@ -10,7 +10,7 @@ use crate::silhouette::capsule::Point3;
 const STATURE_M: std::ops::RangeInclusive<f64> = 1.4..=2.1;
 /// Geometric mean of the range.
 const TYPICAL_M: f64 = 1.7;
-/// Beyond these statures the unit is none that is usual.
+/// Beyond these statures no usual unit is right.
 const POSSIBLE_M: std::ops::RangeInclusive<f64> = 0.8..=2.6;
 /// Share of the feet-to-head vector along an axis for a sure up axis.
 const UPRIGHT: f64 = 0.8;

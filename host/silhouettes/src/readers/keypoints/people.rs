@@ -110,7 +110,7 @@ pub fn followed(frames: &[Vec<Person>]) -> People {
     People { tracks: all.iter().take(MOST).map(points).collect(), others, places }
 }
 
-/// One person of all frames, if none of them shows two and nobody stays in place for half of them: a collection of pictures.
+/// One person of all frames, if none of them shows two and each person stays in place for less than half of them: a collection of pictures.
 fn alone(all: &[Followed]) -> Option<Followed> {
     let mut seen: Vec<(usize, usize)> = all.iter().flat_map(|track| &track.seen).copied().collect();
     seen.sort_unstable();
