@@ -1,7 +1,7 @@
 //! Black borders, which programs that register images leave where an image does not show the scene. Their edge would be the
 //! sharpest place of the image. JPEG adds some codes to their zeros.
 
-use ndarray::{Array2, ArrayView1, ArrayViewMut2, Axis, s};
+use ndarray::{Array2, ArrayBase, ArrayView1, ArrayView2, Axis, Ix2, RawData, s};
 
 /// Least length of a border along an image's side, relative to the side.
 const LENGTH: usize = 16;
@@ -36,10 +36,10 @@ pub(super) enum Edge {
 const SIDES: [(bool, bool); 4] = [(false, false), (false, true), (true, false), (true, true)];
 
 /// The image as seen from a side: its border is above.
-fn from_side(
-    mut image: ArrayViewMut2<'_, f32>,
+fn from_side<S: RawData>(
+    mut image: ArrayBase<S, Ix2>,
     (transposed, reversed): (bool, bool),
-) -> ArrayViewMut2<'_, f32> {
+) -> ArrayBase<S, Ix2> {
     if transposed {
         image = image.reversed_axes();
     }
@@ -59,10 +59,10 @@ pub(super) fn of_registration(images: &[Borders]) -> Sides {
 }
 
 /// Black borders. `code_step` is that of integers from 0 to 1, and 0 for floats, whose borders are zeros.
-pub(super) fn of_image(image: &mut Array2<f32>, code_step: f32) -> Borders {
+pub(super) fn of_image(image: &Array2<f32>, code_step: f32) -> Borders {
     SIDES.map(|side| {
-        let image = from_side(image.view_mut(), side);
-        let borders = borders(&image, code_step);
+        let image = from_side(image.view(), side);
+        let borders = borders(image, code_step);
         let abrupt = borders.iter().filter(|(column, depth)| {
             let column = image.column(*column);
             let mut beyond = column.iter().skip(depth + 1).take(BEYOND_PX);
@@ -78,7 +78,7 @@ pub(super) fn erase(image: &mut Array2<f32>, code_step: f32, sides: Sides) -> bo
     let mut found = false;
     for (side, _) in SIDES.into_iter().zip(sides).filter(|(_, erased)| *erased) {
         let mut image = from_side(image.view_mut(), side);
-        for (column, depth) in borders(&image, code_step) {
+        for (column, depth) in borders(image.view(), code_step) {
             let mut border = image.slice_mut(s![..depth, column]);
             found |= border.iter().any(|value| value.is_finite());
             border.fill(f32::NAN);
@@ -88,7 +88,7 @@ pub(super) fn erase(image: &mut Array2<f32>, code_step: f32, sides: Sides) -> bo
 }
 
 /// Columns with a black border above, and how far it reaches.
-fn borders(image: &ArrayViewMut2<f32>, code_step: f32) -> Vec<(usize, usize)> {
+fn borders(image: ArrayView2<f32>, code_step: f32) -> Vec<(usize, usize)> {
     // Half a code for rounding.
     let darkest = (BLACK + 0.5) * code_step.min(CODE_STEP);
     let is_black = |value: &f32| value.abs() <= darkest || value.is_nan();
@@ -145,7 +145,7 @@ mod tests {
         let dark = |y: usize, x: usize| ((y * 31 + x * 17 + y * x) % 9) as f32 * code_step;
         let mut image =
             Array2::from_shape_fn((120, 160), |(y, x)| if black(y, x) { dark(y, x) } else { 0.5 });
-        let expected = of_image(&mut image, code_step);
+        let expected = of_image(&image, code_step);
         let found = erase(&mut image, code_step, [true; 4]);
         assert_eq!(found, expected.iter().any(Option::is_some));
         (found, image.mapv(f32::is_nan))
@@ -215,17 +215,17 @@ mod tests {
             let ramp = |x: usize| (0.5 * (x as f32 - left as f32) / blur).clamp(0.0, 0.5);
             Array2::from_shape_fn((120, 160), |(_, x)| if x < 160 - right { ramp(x + 1) } else { 0.0 })
         };
-        let of = |images: &mut [Array2<f32>]| {
-            let found: Vec<Borders> = images.iter_mut().map(|image| of_image(image, CODE_STEP)).collect();
+        let of = |images: &[Array2<f32>]| {
+            let found: Vec<Borders> = images.iter().map(|image| of_image(image, CODE_STEP)).collect();
             (of_registration(&found), found)
         };
         let mut images = [image(20, 0, 25.0), image(25, 7, 1.0), image(22, 0, 40.0)];
-        let (erased, found) = of(&mut images);
+        let (erased, found) = of(&images);
         assert!(!erased[2] && erased[3], "{found:?}");
         let bordered: Vec<bool> = images.iter_mut().map(|image| erase(image, CODE_STEP, erased)).collect();
         assert_eq!(bordered, [false, true, false]);
         assert!(images[1][(50, 5)] == 0.0 && images[1][(50, 155)].is_nan());
-        let mut registered = [image(20, 0, 1.0), image(25, 0, 1.0), image(22, 0, 2.0)];
-        assert!(of(&mut registered).0[2]);
+        let registered = [image(20, 0, 1.0), image(25, 0, 1.0), image(22, 0, 2.0)];
+        assert!(of(&registered).0[2]);
     }
 }

@@ -33,6 +33,8 @@ const FOREIGN: f64 = 0.5;
 const COARSELY_ALIKE: f64 = 0.65;
 /// Side of the squares whose means are left without detail, px; it is doubled until there are few enough.
 const DETAIL_PX: usize = 4;
+/// Sharpness of a frame far out of focus, relative to one of the scene, in most blocks.
+const DEFOCUSED: f64 = 0.5;
 const FEW: usize = 50_000;
 /// Part of the links that correlate less than the usual one: in a stack of four, a bad frame breaks two of three.
 const USUAL: f64 = 2.0 / 3.0;
@@ -248,6 +250,14 @@ struct Link {
     registered: f64,
 }
 
+impl Neighbours {
+    fn is_less_sharp(&self, frame: usize, other: usize) -> bool {
+        let [frame, other] = [frame, other].map(|index| &self.sharpness[index]);
+        let less = frame.iter().zip(other).filter(|(frame, other)| **frame < DEFOCUSED * **other).count();
+        2 * less > frame.len()
+    }
+}
+
 impl<S> Comparison<'_, S>
 where
     S: Slices + ?Sized,
@@ -308,7 +318,7 @@ where
             let foreign = neighbours.links.iter_mut().filter(|link| link.registered < FOREIGN * registered);
             foreign.for_each(|link| link.warp = Warp::IDENTITY);
         }
-        let scene = self.scene(&neighbours.links, registered)?;
+        let scene = self.scene(&neighbours, registered)?;
         let members: Vec<usize> = (0..count).filter(|index| scene.warps[*index].is_some()).collect();
         frames.gains = brightness::gains(&neighbours.brightness, &members);
         let of_scene: Vec<Vec<f64>> =
@@ -392,7 +402,8 @@ where
     }
 
     /// `registered` is the usual correlation of neighbours after registration.
-    fn scene(&self, links: &[Link], registered: f64) -> Result<Scene> {
+    fn scene(&self, neighbours: &Neighbours, registered: f64) -> Result<Scene> {
+        let links = &neighbours.links;
         let usual = usual(links.iter().map(|link| link.correlation));
         let limit = if usual > TELLING { FOREIGN * usual } else { f64::NEG_INFINITY };
         let breaks = (0..links.len()).filter(|at| links[*at].correlation < limit).map(|at| at + 1);
@@ -419,8 +430,9 @@ where
                     warps[index] = Some(link.warp.after(&placed));
                     break;
                 }
-                // A moved frame is registered.
-                let is_defocused = link.registered < FOREIGN * registered;
+                // A moved frame is registered, and a foreign one mostly as sharp as the others.
+                let is_defocused =
+                    link.registered < FOREIGN * registered && neighbours.is_less_sharp(index, other);
                 if is_defocused && self.without_detail(other, index)? >= COARSELY_ALIKE {
                     warps[index] = Some(placed);
                     break;

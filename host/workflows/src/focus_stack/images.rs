@@ -149,7 +149,7 @@ impl<'a> Images<'a> {
             };
             read.code_step = read.code_step.max(code_step);
             without_value += image.pixels.iter().filter(|value| !value.is_finite()).count();
-            black.push((black_border::of_image(&mut image.pixels, code_step), code_step));
+            black.push((black_border::of_image(&image.pixels, code_step), code_step));
             read.specks.push(fill_specks(&mut image.pixels));
             read.images.push((end, image.pixels.dim()));
             read.write(index, image.pixels.view())?;

@@ -53,8 +53,7 @@ pub fn prepare_stack(
     use_all: bool,
     context: &Context<'_>,
 ) -> Result<PreparedStack> {
-    let borders: Vec<Borders> =
-        images.iter_mut().map(|image| black_border::of_image(image, code_step)).collect();
+    let borders: Vec<Borders> = images.iter().map(|image| black_border::of_image(image, code_step)).collect();
     let mut specks: Vec<_> = images.iter_mut().map(fill_specks).collect();
     let erased = black_border::of_registration(&borders);
     for image in &mut images {

@@ -163,6 +163,16 @@ fn a_last_frame_far_out_of_focus_is_kept_unless_it_is_foreign() {
     assert_eq!(left_out(&images, None), [0; 0]);
     images[6] = image(&texture(21), 6, 15);
     assert_eq!(left_out(&images, None), [6]);
+    // In the round field of a microscope, whose outline all images share.
+    let mut in_field: Vec<Array2<f32>> = images[..6].to_vec();
+    in_field.push(image(&texture(21), 6, 5));
+    for image in &mut in_field {
+        for ((y, x), value) in image.indexed_iter_mut() {
+            let away = (y as f32 - 108.0).hypot(x as f32 - 144.0);
+            *value /= 1.0 + ((away - 90.0) / 8.0).exp();
+        }
+    }
+    assert_eq!(left_out(&in_field, None), [6]);
 }
 
 #[test]
