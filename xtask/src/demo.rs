@@ -22,7 +22,7 @@ pub fn run() -> Result<()> {
     // Neither uses all cores throughout.
     let (elf, programs) = thread::scope(|scope| {
         let firmware = scope.spawn(|| firmware::build_emulated(way));
-        let programs = host::build_silently();
+        let programs = host::build_silently(&["farnear", "farnear-sim"]);
         (firmware.join().unwrap_or_else(|panic| resume_unwind(panic)), programs)
     });
     elf?;
