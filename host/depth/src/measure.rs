@@ -157,6 +157,7 @@ pub fn measure_pair(
     settings: &MeasureSettings,
 ) -> Result<Measurement, MeasureError> {
     let [far, near] = &images;
+    check_pair(far.view(), near.view())?;
     if is_same(far.view(), near.view()) {
         return Err(RunError::SameImage.into());
     }

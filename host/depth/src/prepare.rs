@@ -290,12 +290,14 @@ pub(crate) fn prepare_after(
     let Some(distortion) = optics.distortion() else {
         return finish(last, [far, near], None, marks, optics, settings);
     };
-    distortion.check_centre(size)?;
     // Interpolation takes noise away, so it is measured before.
     let noise = settings.noise.or_else(|| noise::of_pair(far.view(), near.view()));
     let recorded = Recorded { near: near.clone(), distortion };
     let marks = marks.map(|marks| Some(straight::reasons(marks.as_ref(), size, &distortion)));
     let pair = [far, near].map(|image| straight::image(image.view(), &distortion));
+    if !pair.iter().all(|image| image.iter().any(|value| value.is_finite())) {
+        return Err(distortion.leaves_nothing(size).into());
+    }
     finish(last, pair, Some(recorded), marks, optics, &PrepareSettings { noise, ..*settings })
 }
 

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | PNG, BMP, PBM/PGM/PPM/PAM | all that `image` reads |
 //! | JPEG | complete files only (`zune-jpeg`, strict mode) |
-//! | TIFF, BigTIFF | 1 to 16-bit and 32-bit integers, 16 to 64-bit float, grey, RGB and palettes of up to 8 bits, planar or not, strips or tiles (planes in padded tiles are refused) |
+//! | TIFF, BigTIFF | 1 to 16-bit and 32-bit integers, 16 to 64-bit float, grey, RGB and palettes of up to 8 bits (ImageJ: their numbers, without the colours), planar or not, strips or tiles (planes in padded tiles are refused) |
 //!
 //! The content, not the name, selects the format. EXIF orientation is applied. Raw camera files, previews and other
 //! formats are rejected with a remedy. `file.tif#3` is page 3 (from 1) of a multi-page TIFF. Colour becomes
@@ -30,7 +30,7 @@ use image::ImageFormat;
 use ndarray::Array2;
 
 use decode::largest_but_defective;
-pub(crate) use decode::{Decoded, Samples8, decode, decode_with};
+pub(crate) use decode::{Decoded, Samples8, decode, decode_with, only_page};
 pub use metadata::exposure_time;
 pub use tiff_file::page_count;
 pub(crate) use tiff_file::{Page, Pages, Signed};
@@ -279,10 +279,7 @@ fn read_decoded(path: &Path) -> Result<(Decoded, PathBuf), ImageError> {
         if let Some(pages) = Pages::open(&file)? {
             return Ok((pages.decode(page)?, path.into()));
         }
-        if page != 1 {
-            let reason = "it has one image: only TIFF files have pages".into();
-            return Err(ImageError::Format { path: path.into(), reason });
-        }
+        only_page(Some(page)).map_err(|reason| ImageError::Format { path: path.into(), reason })?;
     }
     let bytes = read_bytes(&file)?;
     let decoded = decode(&bytes).map_err(|reason| ImageError::Format { path: file, reason })?;

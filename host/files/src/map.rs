@@ -58,13 +58,15 @@ pub fn read_with_nodata(path: &Path) -> Result<(Array2<f32>, Option<NoData>), Ma
     if bytes.is_empty() {
         return Err(MapError::Empty { path: path.into() });
     }
+    let refused = |reason: String| MapError::Format { path: path.into(), reason };
     if bytes.starts_with(npy::MAGIC) {
+        image_file::only_page(page).map_err(refused)?;
         let values = npy::read(&bytes).map_err(|reason| MapError::Npy { path: path.into(), reason })?;
         return Ok((values, None));
     }
     let image = image_file::decode_with(&bytes, page, Signed::Refused)
         .and_then(|decoded| decoded.grey(&ReadSettings::default()))
-        .map_err(|reason| MapError::Format { path: path.into(), reason })?;
+        .map_err(refused)?;
     if image.samples != image_file::Samples::Float {
         return Err(MapError::Integers { path: path.into(), samples: image.samples });
     }
@@ -72,7 +74,7 @@ pub fn read_with_nodata(path: &Path) -> Result<(Array2<f32>, Option<NoData>), Ma
         return Err(MapError::Colours { path: path.into() });
     }
     let mut values = image.pixels;
-    let Some(value) = nodata(&bytes) else { return Ok((values, None)) };
+    let Some(value) = nodata(&bytes, page) else { return Ok((values, None)) };
     let mut pixels = 0;
     values.iter_mut().filter(|pixel| **pixel == value).for_each(|pixel| {
         *pixel = f32::NAN;
@@ -81,9 +83,10 @@ pub fn read_with_nodata(path: &Path) -> Result<(Array2<f32>, Option<NoData>), Ma
     Ok((values, (pixels > 0).then_some(NoData { value, pixels })))
 }
 
-fn nodata(tiff: &[u8]) -> Option<f32> {
+fn nodata(tiff: &[u8], page: Option<usize>) -> Option<f32> {
     let directories = tiff_tags::directories(tiff).ok()?;
-    let text = directories.iter().find_map(|directory| directory.nodata.as_deref())?;
+    let mut pages = directories.iter().filter(|directory| !directory.reduced() && !directory.mask());
+    let text = pages.nth(page.unwrap_or(1).saturating_sub(1))?.nodata.as_deref()?;
     text.trim().parse::<f64>().ok().map(|value| value as f32)
 }
 
@@ -92,8 +95,9 @@ pub fn read_mask(path: &Path) -> Result<Array2<bool>, MapError> {
     let (file, page) = image_file::file_and_page(path);
     let bytes = image_file::read_bytes(&file)?;
     if bytes.starts_with(npy::MAGIC) {
-        return npy::read_mask(&bytes)
-            .map_err(|error| MapError::Mask { path: path.into(), reason: error.to_string() });
+        return image_file::only_page(page)
+            .and_then(|()| npy::read_mask(&bytes).map_err(|error| error.to_string()))
+            .map_err(|reason| MapError::Mask { path: path.into(), reason });
     }
     let refused = |reason: String| ImageError::Format { path: path.into(), reason };
     let decoded = image_file::decode_with(&bytes, page, Signed::AsUnsigned).map_err(refused)?;
@@ -289,8 +293,10 @@ mod tests {
     fn a_page_of_a_file_is_read_by_its_number() {
         let mut bytes = Cursor::new(Vec::new());
         let mut encoder = TiffEncoder::new(&mut bytes).unwrap();
-        for value in [5.0, 0.0] {
-            encoder.write_image::<Gray32Float>(1, 1, &[value]).unwrap();
+        for (value, nodata) in [(5.0, "0"), (0.0, "-1")] {
+            let mut image = encoder.new_image::<Gray32Float>(1, 1).unwrap();
+            image.encoder().write_tag(tiff::tags::Tag::Unknown(42113), nodata).unwrap();
+            image.write_data(&[value]).unwrap();
         }
         let (_folder, path) = stored("two.tif", bytes.get_ref());
         let page = |number: usize| PathBuf::from(format!("{}#{number}", path.display()));
@@ -301,6 +307,12 @@ mod tests {
             let error = read(&path).unwrap_err().to_string();
             assert!(error.contains(part) && error.contains("reads (.npy, float TIFF)"), "{error}");
             assert!(read_mask(&path).unwrap_err().to_string().contains(part));
+        }
+        let (_folder, path) = stored("a.npy", &npy::write(array![[5.0]].view()));
+        let page = |number: usize| PathBuf::from(format!("{}#{number}", path.display()));
+        assert!(read(&page(1)).is_ok() && read_mask(&page(1)).is_ok());
+        for error in [read(&page(7)).unwrap_err(), read_mask(&page(7)).unwrap_err()] {
+            assert!(error.to_string().contains("only TIFF files have pages"), "{error}");
         }
     }
 

@@ -16,7 +16,7 @@ mod tally;
 
 use std::{
     ffi::{OsStr, OsString},
-    io,
+    fs, io,
     path::{Path, PathBuf},
     sync::{Arc, Mutex, PoisonError},
     time::Instant,
@@ -186,11 +186,15 @@ pub fn run(
     let table = summary_file(settings);
     if let Some(path) = &table {
         outs.check_report("summary", path, Summary::begins)?;
-        check_folder("summary", path)?;
         if are_same(path, &failures)? {
             let reason = "the failures are written there".into();
             return Err(BatchError::Report { what: "summary", path: path.clone(), reason }.into());
         }
+        if let Some(folder) = path.parent() {
+            let unwritable = |source| BatchError::Write { path: path.clone(), source };
+            fs::create_dir_all(folder).map_err(unwritable)?;
+        }
+        check_folder("summary", path)?;
     }
     let summary = Mutex::new(Summary::default());
     let on_job = |report: &JobReport| {

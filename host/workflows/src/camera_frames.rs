@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use farnear_depth::prepare::{CameraFrames, check_saturation};
 use farnear_files::{
-    image_file::{encode_png, read_grey},
+    image_file::{Samples, encode_png, read_grey},
     map, npy,
     staging::Staging,
 };
@@ -24,7 +24,7 @@ const RESPONSE: &str = "response.npy";
 const BAD: &str = "bad.png";
 /// Least brightness of a flat frame relative to the brightest.
 const DARKEST: f64 = 0.5;
-/// Largest distance of a dark frame's mean from the usual one, relative to the flat frames' mean.
+/// Largest distance of a dark frame's mean from the darkest one's, relative to the flat frames' mean.
 const UNLIKE: f64 = 0.05;
 /// Part of full scale below which light is weak.
 const WEAK: f64 = 0.1;
@@ -85,16 +85,15 @@ pub fn calibrate(settings: &CalibrateCameraRequest, context: &Context<'_>) -> Re
         DARKEST * brightest,
         "one exposure; a dark frame belongs to --dark",
     )?;
-    let mut of_dark = dark.means.clone();
-    of_dark.sort_by(f64::total_cmp);
-    // The darker of two.
-    if let Some(usual) = of_dark.get(of_dark.len().saturating_sub(1) / 2) {
-        let most = UNLIKE * flat.mean();
-        let advice = "one exposure and the lens covered; a flat frame belongs to --flat";
-        dark.check_means("usual", *usual, most, advice)?;
-    }
-    doubts(&flat, &dark).iter().for_each(|doubt| context.progress.warn(doubt));
+    let darkest = dark.means.iter().copied().fold(f64::INFINITY, f64::min);
+    dark.check_means(
+        "darkest",
+        darkest,
+        UNLIKE * flat.mean(),
+        "one exposure and the lens covered; a flat frame belongs to --flat",
+    )?;
     let frames = CameraFrames::learn(&dark.images, &flat.images)?;
+    doubts(&flat, &dark).iter().for_each(|doubt| context.progress.warn(doubt));
     let staged = Staging::into_folder(&settings.out)?;
     staged.write(DARK, &npy::write(frames.dark()))?;
     staged.write(RESPONSE, &npy::write(frames.response()))?;
@@ -119,6 +118,7 @@ struct Exposures<'a> {
     files: &'a [PathBuf],
     images: Vec<Array2<f32>>,
     means: Vec<f64>,
+    are_integers: bool,
     /// Variance of a pixel by lossy compression.
     coding: Vec<f64>,
 }
@@ -126,7 +126,14 @@ struct Exposures<'a> {
 impl<'a> Exposures<'a> {
     /// Fails for an exposure with pixels without a value, or saturated ones.
     fn read(kind: &'static str, files: &'a [PathBuf], context: &Context<'_>) -> Result<Self> {
-        let mut found = Self { kind, files, images: Vec::new(), means: Vec::new(), coding: Vec::new() };
+        let mut found = Self {
+            kind,
+            files,
+            images: Vec::new(),
+            means: Vec::new(),
+            are_integers: true,
+            coding: Vec::new(),
+        };
         for (index, file) in files.iter().enumerate() {
             context.cancel.check("reading the exposures")?;
             let image = read_grey(file)?;
@@ -140,6 +147,7 @@ impl<'a> Exposures<'a> {
                 check_saturation(kind, index + 1, &image.pixels, white)?;
             }
             found.means.push(mean(image.pixels.iter().map(|value| f64::from(*value))));
+            found.are_integers &= image.samples != Samples::Float;
             found.coding.push(image.coding_variance);
             found.images.push(image.pixels);
         }
@@ -154,7 +162,7 @@ impl<'a> Exposures<'a> {
         mean(self.means.iter().copied())
     }
 
-    /// Fails if one has another size than the first flat frame, or if two are one image; only black frames may be.
+    /// Fails if one has another size than the first flat frame, or if two are one image; only frames of one value may be.
     fn check(&self, flat: &Self) -> Result<()> {
         let Some((first, file)) = flat.images.first().zip(flat.files.first()) else { return Ok(()) };
         let (rows, columns) = first.dim();
@@ -168,7 +176,8 @@ impl<'a> Exposures<'a> {
                 return self.refused(index, expected);
             }
             let same = self.images[..index].iter().position(|other| other == image);
-            if let Some(same) = same.filter(|_| image.iter().any(|value| *value != 0.0)) {
+            let value = image.iter().next();
+            if let Some(same) = same.filter(|_| image.iter().any(|other| Some(other) != value)) {
                 let same = self.files[same].display();
                 let expected = format!("it is the same image as {same}, and adds nothing: leave it out");
                 return self.refused(index, expected);
@@ -177,14 +186,14 @@ impl<'a> Exposures<'a> {
         Ok(())
     }
 
-    /// Fails if a mean is farther than `most` from the `usual` one.
-    fn check_means(&self, which: &str, usual: f64, most: f64, advice: &str) -> Result<()> {
-        let off = |index: &usize| (self.means[*index] - usual).abs();
+    /// Fails if a mean is farther than `most` from that of the darkest or the brightest frame.
+    fn check_means(&self, which: &str, reference: f64, most: f64, advice: &str) -> Result<()> {
+        let off = |index: &usize| (self.means[*index] - reference).abs();
         let farthest = (0..self.means.len()).max_by(|a, b| off(a).total_cmp(&off(b)));
         let Some(index) = farthest.filter(|index| off(index) > most) else { return Ok(()) };
         let (kind, mean) = (self.kind, self.means[index]);
         let expected = format!(
-            "its mean is {mean:.3} of full scale, the {which} {kind} frame has {usual:.3}: all need {advice}"
+            "its mean is {mean:.3} of full scale, the {which} {kind} frame has {reference:.3}: all need {advice}"
         );
         self.refused(index, expected)
     }
@@ -196,11 +205,11 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     values.sum::<f64>() / count
 }
 
-/// Warnings of light that is too weak, and of lossy compression.
+/// Warnings of light that is too weak for rounded values, and of lossy compression.
 fn doubts(flat: &Exposures<'_>, dark: &Exposures<'_>) -> Vec<String> {
     let mut found = Vec::new();
     let light = flat.mean() - dark.mean();
-    if light < WEAK {
+    if flat.are_integers && light < WEAK {
         found.push(format!(
             "the flat frames are {:.1} % of full scale above black: noise and rounding then hide the response of the pixels; expose to \
              about half of full scale (unless the camera uses only the lower of the files' bits)",
@@ -280,12 +289,17 @@ mod tests {
 
         /// The warnings.
         fn calibrate(&self, flat: &[&PathBuf], dark: &[&PathBuf]) -> Result<Vec<String>> {
+            let (found, said) = self.tried(flat, dark);
+            found.map(|_| said)
+        }
+
+        fn tried(&self, flat: &[&PathBuf], dark: &[&PathBuf]) -> (Result<CameraFigures>, Vec<String>) {
             let [flat, dark] = [flat, dark].map(|files| files.iter().copied().cloned().collect());
             let heard = Heard::default();
             let context = Context::new(&heard, &Unattended, Cancel::default());
-            calibrate(&CalibrateCameraRequest { flat, dark, out: self.path("out") }, &context)?;
+            let found = calibrate(&CalibrateCameraRequest { flat, dark, out: self.path("out") }, &context);
             let said = heard.0.lock().unwrap().clone();
-            Ok(said)
+            (found, said)
         }
 
         fn refused(&self, flat: &[&PathBuf], dark: &[&PathBuf], phrases: [&str; 3]) {
@@ -307,6 +321,7 @@ mod tests {
         assert_eq!(bench.calibrate(&[&a, &b], &[&d, &e, &f]).unwrap(), [""; 0]);
         bench.refused(&[&a, &b], &[&d, &c, &e, &f], ["dark", "c.png: its mean is 0.500", "--flat"]);
         bench.refused(&[&a, &b], &[&d, &c], ["dark", "c.png: its mean is 0.500", "dark frame has 0.010"]);
+        bench.refused(&[&a], &[&b, &c, &d], ["dark", "its mean is 0.500", "dark frame has 0.010"]);
         bench.refused(&[&a, &d, &b], &[], ["flat", "d.png: its mean is 0.010", "--dark"]);
         bench.refused(&[&a, &b], &[&d, &e, &d], ["dark", "d.png", "the same image"]);
         bench.refused(&[&a, &a], &[&d], ["flat", "a.png", "the same image"]);
@@ -318,8 +333,12 @@ mod tests {
     #[test]
     fn a_camera_that_clips_at_black_has_equal_dark_frames() {
         let bench = Bench(tempfile::tempdir().unwrap());
-        let [black, again] = ["d.png", "e.png"].map(|name| bench.exposure(name, SIZE, [0.0, 0.0]));
-        assert_eq!(bench.calibrate(&[&bench.flat("a.png")], &[&black, &again]).unwrap(), [""; 0]);
+        let flat = bench.flat("a.png");
+        // Two codes of 8 bits.
+        for level in [0.0, 2.0 / 255.0] {
+            let [black, again] = ["d.png", "e.png"].map(|name| bench.exposure(name, SIZE, [level, 0.0]));
+            assert_eq!(bench.calibrate(&[&flat], &[&black, &again]).unwrap(), [""; 0]);
+        }
     }
 
     #[test]
@@ -329,6 +348,15 @@ mod tests {
         let weak = bench.exposure("weak.png", SIZE, [0.03, 0.002]);
         let [said] = &bench.calibrate(&[&weak], &[&dark]).unwrap()[..] else { panic!("one warning") };
         assert!(said.contains("2.0 % of full scale above black"), "{said}");
+        // Floats have any scale.
+        let float = bench.path("float.tiff");
+        let pixels = read_grey(&weak).unwrap().pixels;
+        std::fs::write(&float, map::Format::Tiff.encode(pixels.view()).unwrap()).unwrap();
+        assert_eq!(bench.calibrate(&[&float], &[&dark]).unwrap(), [""; 0]);
+        // An error says more.
+        let as_bright = bench.exposure("e.png", SIZE, [0.03, 0.002]);
+        let (found, said) = bench.tried(&[&weak], &[&as_bright]);
+        assert!(found.is_err() && said.is_empty(), "{said:?}");
         let flat = bench.exposure("a.png", SIZE, [0.5, 0.1]);
         let jpeg = bench.path("a.jpg");
         image::open(&flat).unwrap().into_luma8().save(&jpeg).unwrap();

@@ -37,6 +37,7 @@ use crate::{
     error::{Result, WorkflowError},
     figures::{rounded, rounded_for},
     inputs::{HashedFile, hashed},
+    optics::another_size,
     quantile,
     request::{PathKind, Request},
     result_folder::{self, STACK_RECORD},
@@ -314,6 +315,8 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
         frames.gains.remove(*index);
     }
     warnings.extend(images.bordered());
+    let doubt = listed.optics.as_ref().and_then(|lens| another_size(lens, images.dim(0)));
+    warnings.extend(doubt.map(|doubt| doubt.to_string()));
     if !is_even(&frames.gains) {
         let [least, most] = [f64::min, f64::max].map(|of| frames.gains.iter().copied().fold(1.0, of));
         context.info(&format!(

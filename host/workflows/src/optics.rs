@@ -26,6 +26,9 @@ use crate::{
 
 pub const KIND: &str = "the optics file";
 
+/// Largest distance of the optical axis from the middle of whole images, in their sides.
+const OFF_CENTRE: f64 = 0.2;
+
 #[derive(Clone, Debug)]
 pub struct GivenOptics {
     pub path: PathBuf,
@@ -77,6 +80,11 @@ pub enum OpticsDoubt {
         slices: [usize; 2],
         images: [usize; 2],
     },
+    /// Position of the optical axis in the images, by the camera matrix, and their width and height.
+    OffCentre {
+        centre: [f64; 2],
+        images: [usize; 2],
+    },
     TooMuchBlur {
         blur_px: f64,
         /// Side of the square of pixels to average.
@@ -106,6 +114,12 @@ impl fmt::Display for OpticsDoubt {
                 f,
                 "the lens was calibrated with images of {w}x{h} px, these have {width}x{height}: right for a part of such images, \
                  wrong for scaled ones; calibrate in the mode of the images"
+            ),
+            Self::OffCentre { centre: [cx, cy], images: [width, height] } => write!(
+                f,
+                "[distortion] camera_matrix has its centre at cx = {cx}, cy = {cy}, far from the middle of these images of \
+                 {width}x{height} px: right for a part of the sensor away from its middle, wrong for scaled images; give the matrix in \
+                 pixels of these images"
             ),
             Self::Mosaic { bin } => write!(
                 f,
@@ -155,11 +169,19 @@ pub fn usable_bin(optics: &Optics) -> usize {
     (optics.max_blur_px() / USABLE_BLUR_PX).ceil().clamp(1.0, 16.0) as usize
 }
 
-/// A doubt about a lens that was learned from images of another size (height, width).
+/// A doubt about a lens that was learned, or whose distortion was, from images of another size than this (height, width).
 pub fn another_size(optics: &Optics, (height, width): (usize, usize)) -> Option<OpticsDoubt> {
-    let slices = optics.stage()?.image_px?;
     let images = [width, height];
-    (slices != images).then_some(OpticsDoubt::AnotherSize { slices, images })
+    let slices = optics.stage().and_then(|stage| stage.image_px).filter(|slices| *slices != images);
+    if let Some(slices) = slices {
+        return Some(OpticsDoubt::AnotherSize { slices, images });
+    }
+    let centre = optics.unbinned().distortion()?.centre_px();
+    let is_off = |(at, side): (&f64, &usize)| {
+        let side = *side as f64;
+        (at - 0.5 * (side - 1.0)).abs() > OFF_CENTRE * side
+    };
+    centre.iter().zip(&images).any(is_off).then_some(OpticsDoubt::OffCentre { centre, images })
 }
 
 /// Fails for a lens with a learned response, which holds for its own point spread function only.
@@ -198,5 +220,25 @@ mod tests {
         assert_eq!(another_size(&learned, (480, 640)), None);
         let doubt = another_size(&learned, (240, 320)).unwrap().to_string();
         assert!(doubt.contains("640x480") && doubt.contains("320x240"), "{doubt}");
+    }
+
+    #[test]
+    fn a_camera_matrix_for_images_of_another_size_is_doubted() {
+        let doubt = |[cx, cy]: [f64; 2]| {
+            let distortion = format!(
+                "[distortion]\ncamera_matrix = [[1200.0, 0, {cx:?}], [0, 1200.0, {cy:?}], [0, 0, 1]]\n\
+                 coefficients = [-0.3, 0.1, 0.0, 0.0]\n"
+            );
+            let text = format!("{}\n{distortion}", include_str!("../../../examples/rig.toml"));
+            let optics: Optics = toml::from_str(&text).unwrap();
+            another_size(&optics, (480, 640)).map(|doubt| doubt.to_string())
+        };
+        assert_eq!(doubt([318.25, 243.5]), None);
+        for centre in [[639.5, 479.5], [159.5, 119.5], [-100.0, 243.5], [318.25, 350.0]] {
+            let (doubt, cx) = (doubt(centre).unwrap(), format!("cx = {},", centre[0]));
+            for phrase in ["[distortion] camera_matrix", &cx, "640x480"] {
+                assert!(doubt.contains(phrase), "{doubt}");
+            }
+        }
     }
 }

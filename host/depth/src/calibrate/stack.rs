@@ -166,7 +166,7 @@ pub fn calibrate_stack(
     let plane = FocusPlane::of(&evened, &not_stopped)?;
     let blur = BlurCurve::of(&evened, &plane, &not_stopped)?;
     drop(evened);
-    let (bin, pair_step) = separation(&blur, slices.len(), settings)?;
+    let (bin, pair_step) = separation(&blur, slices.len(), largest_bin(slices[0].dim()), settings)?;
     let limit = FLAT * pair_step as f64;
     if plane.spread > limit {
         return Err(StackError::NotFlat { spread: plane.spread, limit, pair_step });
@@ -236,7 +236,7 @@ fn check(slices: &[Array2<f32>], settings: &StackSettings) -> Result<(), StackEr
         }
     }
     let (height, width) = slices[0].dim();
-    let largest_bin = (height.min(width) / LEAST_SIDE).clamp(1, Stage::LARGEST_BIN);
+    let largest_bin = largest_bin((height, width));
     let counts = [("bin", settings.bin, largest_bin), ("pair_step", settings.pair_step, slices.len() - 2)];
     for (name, value, most) in counts {
         if let Some(value) = value.filter(|value| !(1..=most).contains(value)) {
@@ -247,11 +247,17 @@ fn check(slices: &[Array2<f32>], settings: &StackSettings) -> Result<(), StackEr
     Ok(())
 }
 
+/// Largest accepted binning of images of (height, width).
+fn largest_bin((height, width): (usize, usize)) -> usize {
+    (height.min(width) / LEAST_SIDE).clamp(1, Stage::LARGEST_BIN)
+}
+
 /// Binning and separation whose largest blur is nearest to [`AIM_PX`]; small bins first. Separations are at least
 /// [`ENOUGH_DEPTHS`] slices: with n slices, n pairs see the target within their range.
 fn separation(
     blur: &BlurCurve,
     slices: usize,
+    largest_bin: usize,
     settings: &StackSettings,
 ) -> Result<(usize, usize), StackError> {
     let per_slice = blur.px_per_slice();
@@ -283,12 +289,15 @@ fn separation(
                 }
                 (Some(_), _) => {
                     let is_usable = |bin: &usize| (1..=most).any(|step| is_usable(*bin, step));
-                    ("bin", (1..=Stage::LARGEST_BIN).filter(is_usable).collect())
+                    ("bin", (1..=largest_bin).filter(is_usable).collect())
                 }
             };
+            // Whether one is found if it is left out.
+            let is_found = BINS.iter().any(|bin| (1..=most).any(|step| is_usable(*bin, step)));
+            let or = if is_found { ", or leave it out" } else { "" };
             let hint = match usable[..] {
-                [one] => format!("{name} = {one}, or leave it out"),
-                [least, .., most] => format!("{name} = {least} to {most}, or leave it out"),
+                [one] => format!("{name} = {one}{or}"),
+                [least, .., most] => format!("{name} = {least} to {most}{or}"),
                 [] if per_slice > 1.0 => "a finer step of the stage".into(),
                 [] => "a coarser step of the stage or more slices".into(),
             };
@@ -367,18 +376,24 @@ mod tests {
             (
                 0.25,
                 StackSettings { pair_step: Some(6), ..usual.clone() },
-                "use pair_step = 7 to 19, or leave",
+                "use pair_step = 7 to 19, or leave it out",
             ),
             (0.25, StackSettings { bin: Some(3), ..usual.clone() }, "use bin = 1, or leave it out"),
-            (4.0, StackSettings { bin: Some(1), ..usual.clone() }, "use bin = 2 to 25, or leave it out"),
-            (0.1, StackSettings { pair_step: Some(6), ..usual.clone() }, "use pair_step = 16 to 19, or"),
+            (4.0, StackSettings { bin: Some(1), ..usual.clone() }, "use bin = 2 to 16, or leave it out"),
+            // More slices apart than are tried, and more pixels.
+            (0.1, StackSettings { pair_step: Some(6), ..usual.clone() }, "use pair_step = 16 to 19"),
+            (40.0, StackSettings { bin: Some(1), ..usual.clone() }, "use bin = 12 to 16"),
             (0.01, usual.clone(), "use a coarser step of the stage or more slices"),
-            (0.01, StackSettings { bin: Some(1), ..usual.clone() }, "use a coarser step of the stage"),
+            (
+                0.01,
+                StackSettings { bin: Some(1), ..usual.clone() },
+                "use a coarser step of the stage or more slices",
+            ),
             (99.0, usual.clone(), "use a finer step of the stage"),
         ] {
             let blur = BlurCurve { points: Vec::new(), per_slice_px: [per_slice; 2] };
-            let error = separation(&blur, 21, &given).unwrap_err().to_string();
-            assert!(error.contains(phrase), "{error}");
+            let error = separation(&blur, 21, 16, &given).unwrap_err().to_string();
+            assert!(error.ends_with(phrase), "{error}");
         }
     }
 

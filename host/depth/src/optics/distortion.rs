@@ -59,13 +59,15 @@ impl Distortion {
         Self { focal_px, centre_px, ..self }
     }
 
-    /// Checks that the centre lies inside images of this size (height, width).
-    pub(crate) fn check_centre(&self, (height, width): (usize, usize)) -> Result<(), OpticsError> {
+    /// Position `[cx, cy]` of the optical axis, px.
+    pub fn centre_px(&self) -> [f64; 2] {
+        self.centre_px
+    }
+
+    /// The error for images of (height, width) of which no pixel is left.
+    pub(crate) fn leaves_nothing(&self, (height, width): (usize, usize)) -> OpticsError {
         let [cx, cy] = self.centre_px;
-        if (0.0..=width as f64).contains(&cx) && (0.0..=height as f64).contains(&cy) {
-            return Ok(());
-        }
-        Err(OpticsError::DistortionCentre { cx, cy, width, height })
+        OpticsError::NothingStraight { cx, cy, width, height }
     }
 
     /// Sensor position of the pinhole's pixel `[u, v]`.

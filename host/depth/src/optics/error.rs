@@ -52,10 +52,10 @@ pub enum OpticsError {
     )]
     CameraMatrix { rows: [[f64; 3]; 3] },
     #[error(
-        "[distortion] camera_matrix has its centre at cx = {cx}, cy = {cy}, outside the images of {width}x{height} px: give the matrix \
-         in pixels of these images"
+        "[distortion] leaves no pixel of the images of {width}x{height} px: camera_matrix has its centre at cx = {cx}, cy = {cy}; give \
+         matrix and coefficients for images of this size"
     )]
-    DistortionCentre { cx: f64, cy: f64, width: usize, height: usize },
+    NothingStraight { cx: f64, cy: f64, width: usize, height: usize },
     #[error(
         "[distortion] has {count} coefficients: expected 4, 5 or 8, in OpenCV's order k1, k2, p1, p2, k3, k4, k5, k6"
     )]

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
 use crate::common::{Texture, eight_bit, rig};
+use farnear_depth::measure::{DepthMethod, MeasureError, MeasureSettings, measure_pair};
 use farnear_depth::operators::{Operators, Request, design};
 use farnear_depth::optics::Optics;
 use farnear_depth::pipeline::{DepthMap, RunError, Settings, Warning, depth_from_pair};
@@ -40,6 +41,10 @@ fn pairs_that_cannot_be_processed_are_refused_with_the_values() {
     let constant = Array2::from_elem(far.dim(), 255.0);
     assert_eq!(bench.run(far, &constant).unwrap_err(), RunError::Constant { which: "near", value: 255.0 });
     assert_eq!(bench.run(&(far * f32::NAN), near).unwrap_err(), RunError::NothingFinite);
+    // Both clipped: more than one image given twice.
+    let (both, settings) = ([constant.clone(), constant], MeasureSettings::default());
+    let error = measure_pair(both, &bench.optics, DepthMethod::Whitened, None, &settings).unwrap_err();
+    assert_eq!(error, MeasureError::Run(RunError::Constant { which: "far", value: 255.0 }));
     for settings in [
         Settings { smoothing_px: 4, ..Settings::default() },
         Settings { smoothing_px: 101, ..Settings::default() },

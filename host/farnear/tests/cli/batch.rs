@@ -338,6 +338,11 @@ fn methods_and_models_are_evaluated_as_jobs() {
         assert!(line["error"].as_str().expect("a message").contains(phrase), "{line}");
     }
     let samples = folder.text("people/samples.toml");
+    // The names of a blind set are as secret as its clips.
+    let text = fs::read_to_string(&samples).expect("samples");
+    let blind = folder.file("people/blind.toml", format!("blind = 'kept'\n{text}"));
+    let unopened = ["activity", "evaluate", &blind, "--model", "everyday", "--same", "x=walk"];
+    fails(&mut farnear(&unopened), 1, &["--open-blind-set"]);
     for (arguments, name) in
         [(&["--leave-one-subject-out", "--no-search"][..], "others"), (&["--model", "everyday"], "shipped")]
     {
@@ -386,10 +391,10 @@ fn a_second_run_repeats_the_figures_of_the_first() {
         "{first:?}"
     );
     // Found before the jobs, not after them.
-    let nowhere = folder.text("nodir/figures.csv");
-    let refused = ["batch", &manifest, "--summary", &nowhere];
-    fails(&mut farnear(&refused), 2, &["summary", "there is no folder", "nodir"]);
-    let table = folder.text("figures.csv");
+    let nowhere = format!("{manifest}/figures.csv");
+    let refused = farnear(&["batch", &manifest, "--summary", &nowhere]).output().expect("the program starts");
+    assert!(!refused.status.success() && refused.stdout.is_empty());
+    let table = folder.text("tables/figures.csv");
     let second = run(&["--summary", &table]);
     for (mut first, second) in first.into_iter().zip(&second) {
         assert_eq!(second["state"], "already");

@@ -84,6 +84,11 @@ fn a_lens_that_bends_lines_is_straightened() {
     }
     let record = fs::read_to_string(format!("{out}/stack.toml")).expect("a record");
     assert!(record.contains("[distortion]") && record.contains("0.4"), "{record}");
+    // The matrix of images of twice the size.
+    let doubled = text.replace("39.5", "79.5").replace("29.5", "59.5").replace("0.4", "0.0");
+    fs::write(&optics, doubled).expect("a file");
+    let found = figures(&mut farnear(&arguments));
+    assert!(found["warnings"].to_string().contains("[distortion] camera_matrix"), "{found}");
 }
 
 fn read(out: &str) -> Array2<f32> {

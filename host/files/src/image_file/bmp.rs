@@ -10,7 +10,9 @@ pub(super) fn numbered(bytes: &[u8]) -> Option<(Vec<u8>, Vec<[u8; 3]>)> {
     let colours = if used == 0 { 1 << bits } else { used };
     let begin = header.checked_add(14)?;
     let mut numbered = bytes.to_vec();
-    let palette = numbered.get_mut(begin..begin.checked_add(colours.checked_mul(4)?)?)?;
+    // Fewer colours than stated may be stored before the pixels.
+    let end = begin.checked_add(colours.checked_mul(4)?)?.min(number(10)?);
+    let palette = numbered.get_mut(begin..end)?;
     let entries = palette.as_chunks_mut::<4>().0.iter_mut().zip(0..=u8::MAX);
     let colours = entries.map(|(entry, number)| {
         let [blue, green, red, _] = std::mem::replace(entry, [number, number, number, 0]);

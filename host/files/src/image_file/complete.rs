@@ -1,5 +1,7 @@
 //! Checks for truncated files and unsupported formats.
 
+use super::tiff_tags;
+
 pub(super) const RAW: &str = "it is a camera's raw file: develop it to a 16-bit TIFF, linear and without sharpening (with `dcraw -4 -T`, \
                               RawTherapee or darktable), and give that";
 
@@ -96,8 +98,9 @@ pub(super) fn unsupported(bytes: &[u8]) -> Option<&'static str> {
     if bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"AVI ") || is_media {
         return Some(VIDEO);
     }
-    let found =
-        OTHERS.iter().find(|(at, magic, _)| bytes.get(*at..).is_some_and(|rest| rest.starts_with(magic)));
+    // A TIFF may hold the mark of another format, behind its own.
+    let from = |at: usize| bytes.get(at..).filter(|_| at == 0 || !tiff_tags::is_tiff(bytes));
+    let found = OTHERS.iter().find(|(at, magic, _)| from(*at).is_some_and(|rest| rest.starts_with(magic)));
     found.map(|(.., advice)| *advice)
 }
 

@@ -75,11 +75,17 @@ pub(crate) fn decode_with(bytes: &[u8], number: Option<usize>, signed: Signed) -
     if tiff_tags::is_tiff(bytes) {
         return tiff_file::decode(bytes, number, signed);
     }
-    if number.is_some_and(|number| number != 1) {
-        return Err("it has one image: only TIFF files have pages".into());
-    }
+    only_page(number)?;
     let (decoded, orientation) = if bytes.starts_with(b"\xff\xd8") { jpeg(bytes)? } else { other(bytes)? };
     Ok(decoded.turned(orientation))
+}
+
+/// Fails for another page than the first of a file without pages.
+pub(crate) fn only_page(number: Option<usize>) -> Result<(), String> {
+    match number {
+        None | Some(1) => Ok(()),
+        Some(_) => Err("it has one image: only TIFF files have pages".into()),
+    }
 }
 
 fn jpeg(bytes: &[u8]) -> Result<(Decoded, u8), String> {

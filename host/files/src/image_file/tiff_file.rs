@@ -78,7 +78,8 @@ pub fn page_count(path: &Path) -> Result<usize, ImageError> {
 
 /// Full-resolution images. Fails for raw files, or previews only.
 fn pages<S: Source + ?Sized>(source: &S) -> Result<Vec<Page>, String> {
-    let directories = tiff_tags::directories(source)?;
+    let mut directories = tiff_tags::directories(source)?;
+    palette::without_display(&mut directories);
     let Some(first) = directories.first() else { return Err("it holds no image".into()) };
     if directories.iter().any(|d| d.is_dng || RAW_PHOTOMETRIC.contains(&d.photometric)) {
         return Err(complete::RAW.into());
@@ -137,7 +138,7 @@ pub(super) fn decode(bytes: &[u8], number: Option<usize>, signed: Signed) -> Res
     let sizes: Vec<String> =
         pages.iter().take(3).map(|p| format!("{}x{}", p.directory.width, p.directory.height)).collect();
     Err(format!(
-        "it holds {} images ({}{}): name one as FILE#1 to FILE#{}, or give `farnear focus-stack` this file alone",
+        "it holds {} images ({}{}): name one as FILE#1 to FILE#{}",
         pages.len(),
         sizes.join(", "),
         if pages.len() > 3 { ", ..." } else { "" },

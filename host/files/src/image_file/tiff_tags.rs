@@ -156,6 +156,11 @@ pub(crate) fn is_tiff(bytes: &[u8]) -> bool {
     [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"].iter().any(|magic| bytes.starts_with(*magic))
 }
 
+/// Whether ImageJ or ImageJ2 (SCIFIO) wrote a description.
+pub(crate) fn is_image_j(description: &str) -> bool {
+    ["ImageJ=", "SCIFIO="].iter().any(|program| description.starts_with(program))
+}
+
 /// All directories in file order. Fails for a directory beyond the end, or an endless chain.
 pub(crate) fn directories<S: Source + ?Sized>(source: &S) -> Result<Vec<Directory>, String> {
     let file = File::new(source)?;
@@ -246,9 +251,10 @@ impl<'a, S: Source + ?Sized> File<'a, S> {
         let text = || {
             let bytes = self.source.read(place, count.min(TEXT_MAX))?;
             // Old programs write Latin-1, whose codes are those of Unicode.
-            let text = str::from_utf8(&bytes)
-                .map_or_else(|_| bytes.iter().map(|b| char::from(*b)).collect(), str::to_owned);
-            Some(text.trim_end_matches('\0').to_owned())
+            let latin_1 = |bytes: &[u8]| bytes.iter().map(|byte| char::from(*byte)).collect::<String>();
+            let chunks =
+                bytes.utf8_chunks().map(|chunk| chunk.valid().to_owned() + &latin_1(chunk.invalid()));
+            Some(chunks.collect::<String>().trim_end_matches('\0').to_owned())
         };
         let ratio = || {
             let [above, below] = [0, 4].map(|skip| self.number(place.saturating_add(skip), 4));

@@ -7,7 +7,10 @@ use std::{
 };
 
 use super::{StackError, names::Series};
-use crate::{image_file, order, video::VideoError};
+use crate::{
+    image_file, order,
+    video::{VideoError, pictures},
+};
 
 /// Format by the ending of a name.
 fn format(path: &Path) -> Option<&'static str> {
@@ -16,7 +19,7 @@ fn format(path: &Path) -> Option<&'static str> {
         "jpg" | "jpeg" | "jfif" | "jpe" => "JPEG",
         "png" => "PNG",
         "bmp" | "dib" => "BMP",
-        "pgm" | "ppm" | "pnm" | "pbm" | "pam" => "PGM",
+        "pgm" | "ppm" | "pnm" | "pam" => "PGM",
         _ => return None,
     })
 }
@@ -74,12 +77,11 @@ fn mixed(path: &Path, images: &[PathBuf]) -> Option<StackError> {
     (formats.len() > 1).then(|| StackError::Mixed { path: path.into(), found })
 }
 
-/// Everything but folders and hidden files (other systems leave `._name.png` next to `name.png`), in order of the names.
+/// Everything but folders and hidden files, in order of the names.
 fn files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let entries = fs::read_dir(folder)?.collect::<Result<Vec<_>, _>>()?;
-    let hidden = |path: &Path| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
     let mut files: Vec<PathBuf> = entries.iter().map(fs::DirEntry::path).collect();
-    files.retain(|path| !hidden(path) && !path.is_dir());
+    files.retain(|path| !pictures::hidden(path) && !path.is_dir());
     files.sort();
     Ok(files)
 }
@@ -113,8 +115,11 @@ mod tests {
             let error = list(mixed.path()).unwrap_err().to_string();
             assert!(error.contains(name) && error.contains(phrase), "{error}");
         }
-        let only = folder(&[("i1.webp", webp), ("a.txt", b"notes")]);
-        assert!(list(only.path()).unwrap_err().to_string().contains("WebP"));
+        let ole = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1".as_slice();
+        for other in [("a.txt", b"notes".as_slice()), ("Thumbs.db", ole), ("THUMBS.DB", ole)] {
+            let only = folder(&[("i1.webp", webp), other]);
+            assert!(list(only.path()).unwrap_err().to_string().contains("WebP"), "{other:?}");
+        }
         let (note, other) = (b"note".as_slice(), ("other.webp", webp));
         let twins = folder(&[("i1.png", &png), ("i2.png", &png), ("i2.RAF", raw), ("i3.txt", note), other]);
         assert_eq!(list(twins.path()).unwrap().images.len(), 2);
@@ -134,12 +139,22 @@ mod tests {
 
     #[test]
     fn endings_of_one_format_are_one_format() {
-        for names in [["1.pgm", "2.pnm", "3.pbm", "4.pam"], ["1.bmp", "2.dib", "3.BMP", "4.DIB"]] {
+        for names in [["1.pgm", "2.pnm", "3.ppm", "4.pam"], ["1.bmp", "2.dib", "3.BMP", "4.DIB"]] {
             let stack = folder(&names.map(|name| (name, b"P5".as_slice())));
             assert_eq!(list(stack.path()).unwrap().images.len(), 4, "{names:?}");
         }
         let known = |ending: &str| format(Path::new(&format!("a.{ending}"))).is_some();
-        assert!(crate::video::pictures::EXTENSIONS.into_iter().all(known));
+        assert!(pictures::EXTENSIONS.into_iter().all(known));
+    }
+
+    #[test]
+    fn masks_next_to_the_images_are_no_images() {
+        let png = encode_png(array![[7]].view(), 16).unwrap();
+        let mask = b"P4 1 1\n\x80".as_slice();
+        let folder =
+            folder(&[("1.png", &png), ("1.pbm", mask), ("2.png", &png), ("2.pbm", mask), ("3.pbm", mask)]);
+        assert_eq!(list(folder.path()).unwrap().images.len(), 2);
+        assert_eq!(pictures::list(folder.path()).unwrap().len(), 2);
     }
 
     #[test]

@@ -64,8 +64,8 @@ pub(super) fn object_pixel_um(pages: &[Page]) -> (Option<f64>, Option<String>) {
     match sides() {
         Some((width, height)) if (width - height).abs() > SQUARE * width.min(height) => {
             let remark = format!(
-                "the metadata state pixels of {width} x {height} um, and slopes need square ones: they are per pixel; resample the \
-                 images to square pixels"
+                "the metadata state pixels of {width:.4} x {height:.4} um, which are not square: their size is not used; resample \
+                 the images to square pixels"
             );
             (None, Some(remark))
         }
@@ -78,19 +78,21 @@ fn moving(positions: &[f64]) -> bool {
     positions.windows(2).any(|two| two[0] != two[1])
 }
 
-/// The step between planes that a file states, in um, or a remark that it is not used.
-fn step_um(stated: &str, unit: &str) -> (Option<f64>, Option<String>) {
-    const SET: &str = "it is not used; set it in ImageJ (Image > Properties)";
+/// The step between planes that a file states, in um, or a remark that it is not used, with a remedy.
+fn step_um(stated: &str, unit: &str, remedy: &str) -> (Option<f64>, Option<String>) {
     let Some(step) = finite(stated).filter(|step| *step != 0.0) else {
         let remark = format!(
-            "the file states a spacing of the planes ({stated}) where a number other than 0 was expected: {SET}"
+            "the file states a spacing of the planes ({stated}) where a number other than 0 was expected: it is not used; \
+             {remedy}"
         );
         return (None, Some(remark));
     };
     let um = unit_um(unit);
     // Without a unit, 1 is the default.
     let remark = (um.is_none() && step != 1.0).then(|| {
-        format!("the file states a spacing of the planes ({step}) and no unit of length ({unit}): {SET}")
+        format!(
+            "the file states a spacing of the planes ({step}) and no unit of length ({unit}): it is not used; {remedy}"
+        )
     });
     (um.map(|um| step * um), remark)
 }
@@ -168,25 +170,28 @@ fn one_series(channels: usize, times: usize) -> Result<(), String> {
     Ok(())
 }
 
-/// Text with character references of XML and escapes of Java (`\u00B5`) as characters.
+/// Text with character references of XML as characters.
 fn unescaped(text: &str) -> String {
-    let mut all = String::with_capacity(text.len());
-    let mut rest = text;
-    while let Some(at) = rest.find(['&', '\\']) {
-        all.push_str(&rest[..at]);
-        let escape = &rest[at..];
-        let found = match escape.strip_prefix("\\u").and_then(|digits| digits.get(..4)) {
-            Some(digits) => character(digits, 16).map(|found| (found, 6)),
-            None => escape
-                .strip_prefix('&')
-                .and_then(|name| name.split_once(';'))
-                .and_then(|(name, _)| Some((referenced(name)?, name.len() + 2))),
-        };
-        let (found, length) = found.unwrap_or((if escape.starts_with('&') { '&' } else { '\\' }, 1));
-        all.push(found);
-        rest = &escape[length..];
+    replaced(text, "&", |rest| {
+        let (name, _) = rest.split_once(';')?;
+        Some((referenced(name)?, name.len() + 1))
+    })
+}
+
+/// Text with escapes as characters; `escaped` gives the character and the bytes that it takes after `begin`.
+fn replaced(text: &str, begin: &str, escaped: impl Fn(&str) -> Option<(char, usize)>) -> String {
+    let mut parts = text.split(begin);
+    let mut all = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        if let Some((found, length)) = escaped(part) {
+            all.push(found);
+            all.push_str(&part[length..]);
+        } else {
+            all.push_str(begin);
+            all.push_str(part);
+        }
     }
-    all + rest
+    all
 }
 
 /// The character of a reference `&name;` (XML 1.0, section 4.1).
@@ -212,9 +217,10 @@ fn character(digits: &str, radix: u32) -> Option<char> {
     u32::from_str_radix(digits, radix).ok().and_then(char::from_u32)
 }
 
-/// Micrometres per unit; `None` for pixels and unknown units.
+/// Micrometres per unit, also with escapes of XML or Java (`\u00B5`); `None` for pixels and unknown units.
 pub(super) fn unit_um(unit: &str) -> Option<f64> {
-    let unit = unescaped(unit).trim().to_lowercase().replace(['\u{b5}', '\u{3bc}'], "u");
+    let unit = replaced(&unescaped(unit), "\\u", |rest| Some((character(rest.get(..4)?, 16)?, 4)));
+    let unit = unit.trim().to_lowercase().replace(['\u{b5}', '\u{3bc}'], "u");
     let unit = unit.replace("metre", "meter");
     // `ms` is a time.
     let singular = unit.strip_suffix('s').filter(|unit| unit.len() > 3).unwrap_or(&unit);
@@ -305,12 +311,22 @@ pub(super) mod tests {
             object_pixel_um(&pages(2, &xml))
         };
         let (side, remark) = ome("1.0");
-        assert!(side.is_none() && remark.is_some_and(|remark| remark.contains("0.5 x 1 um")));
+        assert!(side.is_none() && remark.is_some_and(|remark| remark.contains("0.5000 x 1.0000 um")));
         assert_eq!(ome("0.51"), (Some(0.5), None));
         let mut image_j = pages(2, "ImageJ=1.54f\nimages=2\nunit=micron\n");
-        (image_j[0].directory.x_resolution, image_j[0].directory.y_resolution) = (Some(4.0), Some(2.0));
-        let (side, remark) = object_pixel_um(&image_j);
-        assert!(side.is_none() && remark.is_some_and(|remark| remark.contains("0.25 x 0.5 um")));
+        let mut sides = |x, y| {
+            (image_j[0].directory.x_resolution, image_j[0].directory.y_resolution) = (Some(x), Some(y));
+            object_pixel_um(&image_j)
+        };
+        for (x, y, stated) in [
+            (4.0, 2.0, "0.2500 x 0.5000 um"),
+            (2.0, 1.0, "0.5000 x 1.0000 um"),
+            (1.0, 2.0, "1.0000 x 0.5000 um"),
+        ] {
+            let (side, remark) = sides(x, y);
+            assert!(side.is_none() && remark.is_some_and(|remark| remark.contains(stated)), "{stated}");
+        }
+        assert_eq!(sides(1.0, 1.0), (None, None));
     }
 
     #[test]
@@ -321,6 +337,6 @@ pub(super) mod tests {
             assert_eq!(unit_um(&format!("{micro}m")), Some(1.0), "{micro}");
         }
         assert_eq!([unit_um("thou"), unit_um("dm"), unit_um("&#xffffffff;m")], [Some(25.4), Some(1e5), None]);
-        assert_eq!(unescaped("a&amp;b &lt; \\u03bc \\ & &x;"), "a&b < \u{3bc} \\ & &x;");
+        assert_eq!(unescaped("a&amp;b &lt; \\u03bc \\ & &x;"), "a&b < \\u03bc \\ & &x;");
     }
 }

@@ -11,9 +11,9 @@ use crate::{
     order,
 };
 
-/// Lower-case endings of pictures; other files are ignored.
-pub const EXTENSIONS: [&str; 14] =
-    ["png", "tif", "tiff", "jpg", "jpeg", "jfif", "jpe", "bmp", "dib", "pgm", "ppm", "pnm", "pbm", "pam"];
+/// Lower-case endings of pictures; other files are ignored, also .pbm, the masks that programs write next to pictures.
+pub const EXTENSIONS: [&str; 13] =
+    ["png", "tif", "tiff", "jpg", "jpeg", "jfif", "jpe", "bmp", "dib", "pgm", "ppm", "pnm", "pam"];
 
 /// Pictures surveyed for their reading.
 const SURVEYED: usize = 8;
@@ -24,9 +24,7 @@ pub fn list(folder: &Path) -> Result<Vec<PathBuf>, VideoError> {
     for entry in entries {
         let path = entry.map_err(|source| VideoError::io(folder, source))?.path();
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-        // Other systems leave `._name.png` next to `name.png`.
-        let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
-        if hidden || path.is_dir() || !EXTENSIONS.contains(&extension.as_str()) {
+        if hidden(&path) || path.is_dir() || !EXTENSIONS.contains(&extension.as_str()) {
             continue;
         }
         if !path.is_file() {
@@ -42,6 +40,12 @@ pub fn list(folder: &Path) -> Result<Vec<PathBuf>, VideoError> {
         return Err(VideoError::SameStem { first, second });
     }
     Ok(paths)
+}
+
+/// Hidden files, and those that other systems leave: `._name.png` next to `name.png`, `Thumbs.db`.
+pub(crate) fn hidden(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    name.starts_with('.') || name.eq_ignore_ascii_case("Thumbs.db")
 }
 
 pub(super) fn open(

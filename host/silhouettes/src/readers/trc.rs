@@ -67,7 +67,8 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let are_spread = apart > 1
         && all.len() > 2
         && all.len() as f64 == count
-        && (0..).step_by(apart).zip(&all).all(|(at, (place, _))| at == *place);
+        && (0..).step_by(apart).zip(&all).all(|(at, (place, _))| at == *place)
+        && columns(&lines, separator) as f64 <= count;
     let packed = are_spread || cells.iter().enumerate().any(|(at, cell)| at % 3 != 0 && !cell.is_empty());
     let (mut places, mut names): (Vec<usize>, Vec<String>) = if packed {
         cells.iter().filter(|name| !name.is_empty()).map(|name| (*name).to_owned()).enumerate().unzip()

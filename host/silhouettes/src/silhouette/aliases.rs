@@ -29,7 +29,8 @@ pub struct Aliases {
 /// Indices of names, and names in a template.
 type Matches = Vec<(usize, String)>;
 
-/// `None` if a template fits as well without aliases, or none knows enough names to tell what they lack.
+/// `None` if a template fits as well without aliases, or none knows enough names to tell what they lack. A part of a body has no
+/// remark.
 pub fn find(names: &[String]) -> Option<Aliases> {
     let templates: Vec<Template> = Template::names().filter_map(|name| Template::named(name).ok()).collect();
     let covered =
@@ -60,8 +61,11 @@ pub fn find(names: &[String]) -> Option<Aliases> {
         of.max_by_key(|(_, own, _)| *own).filter(|(_, own, _)| *own > known).map(|(_, _, aliases)| aliases)
     };
     let is_fitting = covered.iter().any(|(fits, _)| *fits);
-    let part = || best(false).filter(|aliases| !is_fitting && aliases.names.len() >= LEAST);
-    best(true).or_else(part).cloned()
+    let part = || {
+        let found = best(false).filter(|aliases| !is_fitting && aliases.names.len() >= LEAST)?;
+        Some(Aliases { names: found.names.clone(), remark: String::new() })
+    };
+    best(true).cloned().or_else(part)
 }
 
 /// Matches names to the template `keypoints` only; empty if it does not fit, unless four in five names of a part of a body do.
@@ -184,7 +188,7 @@ fn spellings(names: &[String]) -> Vec<Vec<String>> {
         }
     }
     let is_side = |text: &str| ["left", "right", "l", "r"].contains(&simplified(text).as_str());
-    let shared = counts.into_iter().filter(|(text, count)| *count > 1 && !is_side(text));
+    let shared = counts.into_iter().filter(|(text, count)| 2 * count > names.len() && !is_side(text));
     let shared = shared.max_by_key(|(text, count)| (*count, text.len()));
     let simple: Vec<String> = names.iter().map(|name| simplified(name)).collect();
     let without: Option<Vec<String>> = shared.map(|(text, _)| {
@@ -386,6 +390,9 @@ mod tests {
         let rig: Vec<String> = bones.split_whitespace().map(|bone| format!("Character1_{bone}")).collect();
         let helpers = "L_Radius_MESH L_Radius_MESH_End L_Tibia_MESH R_Radius_MESH R_Radius_MESH_End R_Tibia_MESH Neck_MESH";
         assert_eq!(template_of(&format!("{} {helpers}", rig.join(" "))), ("bvh".into(), 19));
+        // A prefix that half of the names have is not that of all.
+        let other = bones.split_whitespace().map(|bone| format!("Character2_{bone}"));
+        assert_eq!(find(&rig.into_iter().chain(other).collect::<Vec<String>>()), None);
     }
 
     #[test]
@@ -417,12 +424,15 @@ mod tests {
         let names = "V_Sacral R_ASIS L_ASIS R_Knee_Lat R_Thigh_Upper L_Knee_Lat L_Thigh_Upper R_Ankle_Lat L_Ankle_Lat R_Heel R_MTP1 \
                      L_Heel L_MTP1 Clavicle R_Acromium L_Acromium";
         let mut names: Vec<String> = names.split_whitespace().map(str::to_owned).collect();
-        let found = find(&names).expect("a part").names;
+        let Aliases { names: found, remark } = find(&names).expect("a part");
+        assert_eq!(remark, "", "a template of one's own may fit");
         assert!(found.iter().any(|(_, known)| known == "left knee") && found.len() == 11, "{found:?}");
         names.extend(found.into_iter().map(|(_, known)| known));
         let error = Template::named("keypoints").expect("built in").check(&names).expect_err("no head");
         assert!(
-            error.to_string().starts_with("only shoulders, trunk, hips, left thigh, left leg"),
+            error
+                .to_string()
+                .starts_with("the recording has only shoulders, trunk, hips, left thigh, left leg"),
             "{error}"
         );
     }

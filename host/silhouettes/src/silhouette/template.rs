@@ -58,12 +58,12 @@ fn lacking(missing: &[String], of: usize, template: &str, parts: &[String], pres
             "none of the recording's names ({names}) is one of the {of} markers of template `{template}` ({missing})"
         );
     }
-    let only = match parts {
-        [] => String::new(),
-        _ => format!("only {}: a part of a body is not drawn; ", parts.join(", ")),
+    let subject = match parts {
+        [] => "the recording".to_owned(),
+        _ => format!("the recording has only {}, and a part of a body is not drawn; it", parts.join(", ")),
     };
     format!(
-        "{only}the recording lacks {count} of the {of} markers of template `{template}` ({missing}); it has {names}"
+        "{subject} lacks {count} of the {of} markers of template `{template}` ({missing}); it has {names}"
     )
 }
 

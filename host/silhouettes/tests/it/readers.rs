@@ -156,7 +156,7 @@ fn unknown_markers_are_named() {
     let error = error.expect_err("legs").to_string();
     assert!(
         error.starts_with(
-            "only lower torso, left thigh, right thigh, left leg and foot, right leg and foot: a part"
+            "the recording has only lower torso, left thigh, right thigh, left leg and foot, right leg and foot, and a part"
         ),
         "{error}"
     );
@@ -277,6 +277,11 @@ fn a_trc_file_with_whole_columns_between_its_names_is_read() {
         assert_eq!(trc::read(spread.as_bytes()), trc::read(text.as_bytes()));
     }
     assert_eq!(trc::read(text.as_bytes()).expect("a TRC file").names, ["A", "B", "C"]);
+    // Values in every column are those of unnamed trajectories, too.
+    let whole = text.replace("A\t\t\tB\t\t\tC", &["A", "B", "C"].join(&"\t".repeat(6)));
+    let whole = whole.replace("\t9\n", &format!("\t9{}\n", "\t10\t11\t12".repeat(3)));
+    let found = trc::read(whole.as_bytes()).expect("a TRC file");
+    assert_eq!(found.frames[0], [1.0, 7.0, 10.0].map(|x| Some([x, x + 1.0, x + 2.0])));
 }
 
 #[test]

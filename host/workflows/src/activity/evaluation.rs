@@ -200,8 +200,8 @@ fn check_others(request: &EvaluateRequest) -> Result<()> {
     let Some(train) = request.train.as_ref().filter(|_| !request.leave_one_subject_out) else {
         return Ok(());
     };
-    let tested = Samples::labels(&request.samples)?;
-    let trained = Samples::labels(train)?;
+    let tested = Samples::labels(&request.samples, None)?;
+    let trained = Samples::labels(train, None)?;
     let [subjects, activities] = [0, 1].map(|at| names(trained.iter().map(|label| &label[at])));
     // Clips of other activities do not count.
     let counts =

@@ -136,11 +136,15 @@ fn check_views(asked: Option<Views>, of_model: usize) -> Result<()> {
     Ok(())
 }
 
-/// Refuses pairs of names of which the samples or the model lack one. Reads no masks.
+/// Refuses pairs of names of which the samples or the model lack one, and blind samples. Reads no masks.
 pub(super) fn check_same(request: &EvaluateRequest, model: &Model) -> Result<()> {
+    if request.same.is_empty() {
+        return Ok(());
+    }
     let mut of_samples = BTreeSet::new();
     for set in std::iter::once(&request.samples).chain(&request.leave_one_set_out) {
-        of_samples.extend(Samples::labels(set)?.into_iter().map(|[_, activity]| activity));
+        let labels = Samples::labels(set, request.open_blind_set.as_deref())?;
+        of_samples.extend(labels.into_iter().map(|[_, activity]| activity));
     }
     for (own, known) in request.same() {
         let same = || format!("{own}={known}");

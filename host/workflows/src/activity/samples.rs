@@ -126,15 +126,26 @@ fn listed(path: &Path) -> Result<File> {
     toml::from_str(&text).about(|| path.display().to_string())
 }
 
+/// The reason to open a set, if it is blind. Fails without one.
+fn opening<'a>(blind: Option<String>, path: &Path, reason: Option<&'a str>) -> Result<Option<&'a str>> {
+    let Some(why) = blind else { return Ok(None) };
+    match reason.filter(|reason| !reason.trim().is_empty()) {
+        Some(reason) => Ok(Some(reason)),
+        None => Err(SamplesError::Blind { samples: path.into(), why }.into()),
+    }
+}
+
 impl Samples {
     pub fn folders(path: &Path) -> Result<Vec<PathBuf>> {
         let base = path.parent().unwrap_or(Path::new(""));
         Ok(listed(path)?.samples.iter().map(|sample| base.join(&sample.masks)).collect())
     }
 
-    /// Subject and activity of every sample; reads no masks.
-    pub fn labels(path: &Path) -> Result<Vec<[String; 2]>> {
-        Ok(listed(path)?.samples.into_iter().map(|sample| [sample.subject, sample.activity]).collect())
+    /// Subject and activity of every sample, of a blind set with a reason only. Reads no masks and records nothing.
+    pub fn labels(path: &Path, reason: Option<&str>) -> Result<Vec<[String; 2]>> {
+        let file = listed(path)?;
+        opening(file.blind, path, reason)?;
+        Ok(file.samples.into_iter().map(|sample| [sample.subject, sample.activity]).collect())
     }
 
     /// Reads and describes the masks. Fails for a mix of full frames and cut-out silhouettes.
@@ -146,10 +157,7 @@ impl Samples {
     pub fn read_opened(path: &Path, reason: Option<&str>, context: &Context<'_>) -> Result<Self> {
         let base = path.parent().unwrap_or(Path::new(""));
         let file = listed(path)?;
-        if let Some(why) = file.blind {
-            let Some(reason) = reason.filter(|reason| !reason.trim().is_empty()) else {
-                return Err(SamplesError::Blind { samples: path.into(), why }.into());
-            };
+        if let Some(reason) = opening(file.blind, path, reason)? {
             record_opening(base, path, reason)?;
             context.progress.warn(&format!("{}: this set is blind; its opening is recorded", path.display()));
         }
@@ -377,6 +385,8 @@ mod tests {
         let error = Samples::read(&samples, &context).map(|_| ()).expect_err("blind").to_string();
         assert!(error.contains("kept for releases") && error.contains("--open-blind-set"), "{error}");
         assert!(Samples::read_opened(&samples, Some(" "), &context).is_err());
+        assert_eq!(Samples::labels(&samples, None).expect_err("blind").to_string(), error);
+        assert_eq!(Samples::labels(&samples, Some("release 1")).expect("labels"), [["a", "walk"]]);
         let openings = folder.path().join("openings.csv");
         assert!(!openings.exists());
         for reason in ["release 1", "release \"2\""] {

@@ -378,12 +378,11 @@ fn read(
     Ok((slices, coding))
 }
 
-/// The far image of the pair whose range has the focus half way between its middle, where both images look the same, and
-/// an end.
+/// The far image of the pair whose range has the focus between its middle, where both images look the same, and an end.
 fn telling_pair(focus: f64, pair_step: usize, slices: usize) -> usize {
     let off = |far: &usize| {
         let alpha = 2.0 * (focus - *far as f64) / pair_step as f64 - 1.0;
-        (alpha.abs() - 0.5).abs()
+        (alpha.abs() - 0.6).abs()
     };
     (0..slices.saturating_sub(pair_step)).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0)
 }

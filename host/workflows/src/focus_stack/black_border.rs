@@ -6,7 +6,7 @@ use ndarray::{Array2, ArrayBase, ArrayView1, ArrayView2, Axis, Ix2, RawData, s};
 /// Least length of a border along an image's side, relative to the side.
 const LENGTH: usize = 16;
 const LENGTH_PX: usize = 16;
-/// Any stretch of dark pixels at an edge that is no deeper ends in a straight line: a border is then half as long as the side.
+/// A stretch of dark pixels of at most this depth always ends in a straight line: a border is then half as long as the side.
 const SHALLOW_PX: f64 = 3.0;
 /// A border ends in a straight line: part of its rows or columns that are so close to it. In the borders of eight stacks it was
 /// 0.76 or more, in dark scenes 0.24 or less.

@@ -60,20 +60,20 @@ pub(crate) fn read_two(
     }
     let maps = maps.map(|map| map.depth(unit, &mut remarks));
     if unknown > 0 {
-        remarks.extend(of_other_unit(&maps));
+        remarks.extend(of_other_unit(name, &maps));
     }
     remarks.iter().for_each(|remark| context.progress.warn(remark));
     Ok((maps, unit))
 }
 
-fn of_other_unit(maps: &[Array2<f32>; 2]) -> Option<String> {
+fn of_other_unit(name: &str, maps: &[Array2<f32>; 2]) -> Option<String> {
     // Positions may have any sign.
     let size = |map: &Array2<f32>| quantile::of_map(map.mapv(f32::abs).view(), 0.5);
     let [first, second] = [size(&maps[0])?, size(&maps[1])?];
     (first.max(second) > OTHER_UNIT * first.min(second)).then(|| {
         let [first, second] = [first, second].map(|size| rounded_for(size, size, 3));
         format!(
-            "the median of the first map's depths is {first}, of the second's {second}: is one of them in another unit, or counted \
+            "the median of the first map's depths is {first}, of the {name}'s {second}: is one of them in another unit, or counted \
              from another zero?"
         )
     })
@@ -139,16 +139,20 @@ mod tests {
         let map = |name: &str, x: usize| {
             let map = folder.path().join(name);
             std::fs::create_dir(&map).unwrap();
-            std::fs::write(map.join("depth.npy"), farnear_files::npy::write(array![[900.0]].view())).unwrap();
+            for file in ["depth.npy", "corrected.npy"] {
+                std::fs::write(map.join(file), farnear_files::npy::write(array![[900.0]].view())).unwrap();
+            }
             let optics = include_str!("../../../../examples/rig.toml").replace('[', "[optics.");
             let part = format!("[part]\nx = {x}\ny = 0\nimage_width = 9\nimage_height = 9\n");
             std::fs::write(map.join("depth.toml"), optics + &part).unwrap();
-            read_map(&map).unwrap()
+            ["depth.npy", "corrected.npy"].map(|file| read_map(&map.join(file)).unwrap())
         };
         let (a, b) = (map("a", 0), map("b", 4));
-        assert_eq!(shared_unit("difference", &a, &a).unwrap(), Unit::Mm);
-        let error = shared_unit("difference", &a, &b).unwrap_err();
-        assert!(error.is_usage() && error.to_string().contains("begins at 4,0"), "{error}");
+        assert_eq!(shared_unit("difference", &a[0], &a[1]).unwrap(), Unit::Mm);
+        for (first, second) in a.iter().zip(&b) {
+            let error = shared_unit("difference", first, second).unwrap_err();
+            assert!(error.is_usage() && error.to_string().contains("begins at 4,0"), "{error}");
+        }
     }
 
     #[test]
@@ -200,6 +204,10 @@ mod tests {
                 "{said:?}"
             );
         }
+        let heard = Heard::default();
+        read_two("truth", [&mm, &m], &Context::new(&heard, &Unattended, Cancel::default())).unwrap();
+        let said = heard.0.lock().unwrap().join("\n");
+        assert!(said.contains("first map's depths is 9") && said.contains("of the truth's 0.9"), "{said}");
     }
 
     #[derive(Default)]

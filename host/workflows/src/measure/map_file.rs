@@ -47,7 +47,7 @@ pub(crate) struct MapFile {
     file: PathBuf,
     values: Array2<f32>,
     nodata: Option<NoData>,
-    /// `None` without a record.
+    /// `None` without a record, and for another map next to one, such as the true depth.
     pub unit: Option<Unit>,
     /// Part of the images that the map shows; `None` for all.
     pub part: Option<Part>,
@@ -104,20 +104,21 @@ pub(crate) fn read_map(path: &Path) -> Result<MapFile> {
     values_of(&file, record.as_ref())
 }
 
-/// The file of a map, its folder, and the record there if it describes this file: another map, such as the true depth, may have another
-/// unit. Fails for a file of a result that is not its depth.
+/// The file of a map, its folder, and the record there. Fails for a file of a result that is not its depth.
 fn with_record(path: &Path) -> Result<(PathBuf, PathBuf, Option<Record>)> {
     let (file, folder) = file_and_folder(path);
     let record = record_of(&folder)?;
-    if file.file_stem() == Some("depth".as_ref()) {
-        return Ok((file, folder, record));
-    }
-    if record.is_some() && result_folder::files().any(|name| file.file_name() == Some(name.as_ref())) {
+    let is_of_result = || result_folder::files().any(|name| file.file_name() == Some(name.as_ref()));
+    if record.is_some() && !is_depth(&file) && is_of_result() {
         let reason =
             "it is another file of a result, whose depth is in depth.npy, depth.tiff or depth.png: name that";
         return Err(WorkflowError::file(&file, "a depth map")(reason));
     }
-    Ok((file, folder, None))
+    Ok((file, folder, record))
+}
+
+fn is_depth(file: &Path) -> bool {
+    file.file_stem() == Some("depth".as_ref())
 }
 
 pub(super) fn read(path: &Path) -> Result<Measured> {
@@ -129,7 +130,7 @@ pub(super) fn read(path: &Path) -> Result<Measured> {
     let deviation = deviation_of(&file, &folder, depth.dim())?;
     let lateral = match &record {
         Some(Record::Depth(record)) => lateral(&record.optics, record.part),
-        Some(Record::Stack(record)) => match (record.unit, &record.optics, record.object_pixel_um) {
+        Some(Record::Stack(record)) => match (unit, &record.optics, record.object_pixel_um) {
             (Unit::Mm, Some(optics), _) => lateral(optics, None),
             (Unit::Um, _, Some(side)) => Lateral::Pixel(side),
             _ => Lateral::Unknown,
@@ -174,7 +175,7 @@ fn record_of(folder: &Path) -> Result<Option<Record>> {
 }
 
 fn values_of(file: &Path, record: Option<&Record>) -> Result<MapFile> {
-    let unit = record.map(|record| match record {
+    let unit = record.filter(|_| is_depth(file)).map(|record| match record {
         Record::Depth(_) => Unit::Mm,
         Record::Stack(stack) => stack.unit,
     });
@@ -199,7 +200,7 @@ fn values_of(file: &Path, record: Option<&Record>) -> Result<MapFile> {
 fn deviation_of(file: &Path, folder: &Path, dim: (usize, usize)) -> Result<Option<Array2<f32>>> {
     let path = folder.join("uncertainty.npy");
     // Another map in the folder, such as the true depth, has no deviation.
-    if file.file_stem() != Some("depth".as_ref()) || !path.exists() {
+    if !is_depth(file) || !path.exists() {
         return Ok(None);
     }
     let deviation = map::read(&path)?;
@@ -247,6 +248,26 @@ mod tests {
         assert!(truth.unit == Unit::Mm && truth.remarks[0].contains("truth.npy are taken as mm"));
         let error = found("confidence.npy").expect_err("a reliability").to_string();
         assert!(error.contains("confidence.npy") && error.contains("depth.npy"), "{error}");
+    }
+
+    #[test]
+    fn another_map_next_to_a_record_has_its_region_and_axis() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let map = npy::write(Array2::from_elem((3, 4), 900.0).view());
+        for name in ["depth.npy", "corrected.npy"] {
+            fs::write(folder.path().join(name), &map).expect("a writable folder");
+        }
+        let optics = include_str!("../../../../examples/rig.toml").replace('[', "[optics.");
+        let part = "[part]\nx = 5\ny = 0\nimage_width = 9\nimage_height = 9\n";
+        fs::write(folder.path().join(DEPTH_RECORD), optics + part).expect("a writable folder");
+        let found = |name: &str| {
+            let path = folder.path().join(name);
+            (read_map(&path).expect("a map"), read(&path).expect("a map").lateral)
+        };
+        let [(depth, lateral), (corrected, same)] = ["depth.npy", "corrected.npy"].map(found);
+        assert!(depth.part.is_some() && corrected.part == depth.part, "{:?}", corrected.part);
+        assert_eq!(same, lateral);
+        assert_eq!((depth.unit, corrected.unit), (Some(Unit::Mm), None));
     }
 
     #[test]

@@ -303,15 +303,24 @@ fn a_wrong_white_level_does_not_blame_the_file() {
 
 #[test]
 fn pixels_that_a_bmp_skips_have_its_first_colour() {
+    let read = |size: [u32; 2], used: u32, palette: &[[u8; 4]], runs: &[u8]| {
+        let [width, height] = size;
+        let header = [40, width, height, 1 | 8 << 16, 1, runs.len() as u32, 0, 0, used, 0];
+        let header = header.map(u32::to_le_bytes).concat();
+        let begin = 14 + 40 + 4 * palette.len() as u32;
+        let file = [begin + runs.len() as u32, 0, begin].map(u32::to_le_bytes).concat();
+        let bytes = [b"BM".as_slice(), &file, &header, palette.as_flattened(), runs, &[0_u8; 1024]].concat();
+        decode_grey(&bytes).unwrap().pixels.mapv(|value| (255.0 * value).round())
+    };
     let palette = [[9, 6, 3, 0], [90, 60, 30, 0], [255, 255, 255, 0]];
     // Two pixels of colour 1; one skipped, one of colour 2, end of the row; the rest skipped.
     let runs = [2, 1, 0, 2, 1, 0, 1, 2, 0, 0, 0, 1];
-    let header = [40, 5, 2, 1 | 8 << 16, 1, runs.len() as u32, 0, 0, 3, 0].map(u32::to_le_bytes).concat();
-    let begin = 14 + 40 + 12;
-    let file = [begin + runs.len() as u32, 0, begin].map(u32::to_le_bytes).concat();
-    let bytes = [b"BM".as_slice(), &file, &header, palette.as_flattened(), &runs].concat();
-    let pixels = decode_grey(&bytes).unwrap().pixels.mapv(|value| (255.0 * value).round());
-    assert_eq!(pixels, ndarray::array![[6.0, 6.0, 6.0, 6.0, 6.0], [60.0, 60.0, 6.0, 255.0, 6.0]]);
+    let expected = ndarray::array![[6.0, 6.0, 6.0, 6.0, 6.0], [60.0, 60.0, 6.0, 255.0, 6.0]];
+    assert_eq!(read([5, 2], 3, &palette, &runs), expected);
+    // 256 colours are stated, by 0, and two are stored.
+    let few = read([2, 2], 0, &palette[..2], &[2, 1, 0, 0, 1, 1, 0, 1]);
+    assert_eq!(few, ndarray::array![[60.0, 6.0], [60.0, 60.0]]);
+    read([2, 1], 0, &palette[..2], &[2, 200, 0, 1]);
 }
 
 /// Mean of the squared steps of T.81, table K.1, over 0.08 to 0.3 cycles per pixel, a twelfth of it: 39.88.

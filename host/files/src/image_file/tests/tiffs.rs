@@ -42,6 +42,30 @@ fn palettes_are_read_as_their_colours() {
 }
 
 #[test]
+fn palettes_of_image_j_are_for_display_only() {
+    let inverse: Vec<u16> = (0..3 * 256).map(|at| if at < 256 { 65535 - 257 * at } else { 0 }).collect();
+    let page = Page::grey(2, 1, 8, vec![7, 200]).with(262, &[3]).with(320, &inverse);
+    for program in ["ImageJ=1.54f\nimages=2\n", "SCIFIO=0.46.0\nimages=2\n"] {
+        let first = Page { texts: vec![(270, program.into())], ..page.clone() };
+        let bytes = tiff(CLASSIC, &[first, page.clone()]);
+        for number in [1, 2] {
+            let decoded = decode_with(&bytes, Some(number), Signed::Refused).unwrap();
+            let pixels = decoded.grey(&ReadSettings::default()).unwrap().pixels;
+            assert_eq!(pixels.mapv(|v| (255.0 * v).round()), array![[7.0, 200.0]], "{program} {number}");
+        }
+    }
+}
+
+#[test]
+fn a_tiff_may_hold_the_mark_of_another_format() {
+    for (at, mark) in [(128, b"DICM".as_slice()), (208, b"MAP DA\0\0")] {
+        let mut bytes = tiff(CLASSIC, &[Page::grey(16, 16, 8, vec![7; 256])]);
+        bytes[at..at + mark.len()].copy_from_slice(mark);
+        assert_eq!(read(&bytes).dim(), (16, 16), "{at}");
+    }
+}
+
+#[test]
 fn lzw_data_without_an_end_have_one_remedy() {
     use tiff::encoder::{Compression, TiffEncoder, colortype::Gray8};
     let pixels: Vec<u8> = (0..40 * 30).map(|i| (i * i % 251) as u8).collect();
@@ -59,15 +83,16 @@ fn lzw_data_without_an_end_have_one_remedy() {
 }
 
 #[test]
-fn a_text_that_is_not_utf_8_is_latin_1() {
+fn bytes_of_a_text_that_are_not_utf_8_are_latin_1() {
     let unit = |letter: &[u8]| {
-        let page = Page { texts: vec![(270, "unit=~~m".into())], ..Page::grey(1, 1, 8, vec![7]) };
+        let page = Page { texts: vec![(270, "unit=~~m \u{b5}".into())], ..Page::grey(1, 1, 8, vec![7]) };
         let mut bytes = tiff(CLASSIC, &[page]);
         let at = bytes.windows(2).position(|two| two == b"~~").unwrap();
         bytes[at..at + 2].copy_from_slice(letter);
         tiff_tags::directories(&bytes[..]).unwrap()[0].description.clone().unwrap()
     };
-    assert_eq!([unit(b"\xb5m"), unit("\u{b5}".as_bytes())], ["unit=\u{b5}mm", "unit=\u{b5}m"]);
+    let units = [unit(b"\xb5m"), unit("\u{b5}".as_bytes())];
+    assert_eq!(units, ["unit=\u{b5}mm \u{b5}", "unit=\u{b5}m \u{b5}"]);
 }
 
 #[test]
@@ -157,7 +182,7 @@ fn a_file_of_several_pages_needs_a_page_number() {
     let pages: Vec<Page> = (0..3).map(|i| Page::grey(1, 1, 8, vec![10 * i])).collect();
     fs::write(&path, tiff(CLASSIC, &pages)).unwrap();
     let refused = read_grey(&path).unwrap_err().to_string();
-    assert!(refused.contains("3 images") && refused.contains("focus-stack"), "{refused}");
+    assert!(refused.contains("3 images") && refused.ends_with("FILE#1 to FILE#3"), "{refused}");
     let page = |number: &str| read_grey(&folder.path().join(format!("stack.tif#{number}")));
     assert_eq!(page("3").unwrap().pixels[(0, 0)], 20.0 / 255.0);
     assert!(page("4").unwrap_err().to_string().contains("1 to 3"));

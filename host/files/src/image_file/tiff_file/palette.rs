@@ -1,11 +1,12 @@
-//! Palettes. The decoder refuses them, so that it reads the numbers of the colours as grey.
+//! Palettes. The decoder refuses them, so that it reads the numbers of the colours as grey. Those of ImageJ are for display only: the
+//! numbers are the brightness.
 
 use std::{
     io::{self, Read, Seek, SeekFrom},
     ops::Range,
 };
 
-use super::{Decoded, Directory, Values};
+use super::{Decoded, Directory, Values, tiff_tags};
 
 /// PhotometricInterpretation of a palette, and of grey whose black is 0.
 const PALETTE: u8 = 3;
@@ -18,6 +19,15 @@ pub(super) fn is_read(page: &Directory) -> bool {
         && page.colour_map.len() == 3 << page.bits
 }
 
+/// Pages with a palette for display only become grey.
+pub(super) fn without_display(pages: &mut [Directory]) {
+    let described = pages.first().and_then(|first| first.description.as_deref());
+    if described.is_some_and(tiff_tags::is_image_j) {
+        let pages = pages.iter_mut().filter(|page| page.photometric == u64::from(PALETTE));
+        pages.for_each(|page| page.photometric = u64::from(GREY));
+    }
+}
+
 /// A file whose palette page reads as grey.
 pub(super) struct AsGrey<R> {
     file: R,
@@ -27,8 +37,7 @@ pub(super) struct AsGrey<R> {
 
 impl<R: Seek> AsGrey<R> {
     pub fn new(file: R, page: &Directory) -> Self {
-        let length = if page.photometric == u64::from(PALETTE) { 4 } else { 0 };
-        let kind = page.photometric_at..page.photometric_at.saturating_add(length);
+        let kind = page.photometric_at..page.photometric_at.saturating_add(4);
         Self { file, at: 0, kind }
     }
 }

@@ -2,14 +2,16 @@
 //! `axes=X,Y,Channel,Z`, `lengths=`, `scales=` and `units=`.
 
 use super::{even, finite, one_series, step_um, unit_um};
-use crate::image_file::{Page, tiff_tags::Directory};
+use crate::image_file::{
+    Page,
+    tiff_tags::{self, Directory},
+};
 
 pub(super) struct Description<'a>(&'a str);
 
 impl<'a> Description<'a> {
     pub fn of(description: &'a str) -> Option<Self> {
-        let known = ["ImageJ=", "SCIFIO="].iter().any(|program| description.starts_with(program));
-        known.then_some(Self(description))
+        tiff_tags::is_image_j(description).then_some(Self(description))
     }
 
     fn value(&self, key: &str) -> Option<&'a str> {
@@ -19,18 +21,19 @@ impl<'a> Description<'a> {
     /// The entry of the list `key` for an axis.
     fn along(&self, axis: &str, key: &str) -> Option<&'a str> {
         let at = self.value("axes")?.split(',').position(|other| other.trim() == axis)?;
-        self.value(key)?.split(',').nth(at).map(str::trim).filter(|entry| *entry != "null")
+        self.value(key)?.split(',').nth(at).map(str::trim)
     }
 
     fn unit(&self, axis: &str) -> &'a str {
-        self.along(axis, "units").or(self.value("unit")).unwrap_or("none")
+        let unit = if self.value("units").is_some() { self.along(axis, "units") } else { self.value("unit") };
+        unit.unwrap_or("none")
     }
 
     /// Positions in um, and a remark on them. Fails for channels, times and missing planes.
     pub fn positions_um(&self, pages: &[Page]) -> Result<(Option<Vec<f64>>, Option<String>), String> {
         let count = |key| self.value(key).and_then(|text| text.parse::<usize>().ok()).unwrap_or(1);
         let other_axes = self.value("axes").unwrap_or_default().split(',').map(str::trim);
-        let other_axes = other_axes.filter(|axis| !["X", "Y", "Z", "Channel"].contains(axis));
+        let other_axes = other_axes.filter(|axis| !["X", "Y", "Z", "Channel", "Unknown"].contains(axis));
         let lengths = other_axes.filter_map(|axis| self.along(axis, "lengths")?.parse::<usize>().ok());
         let samples = pages.first().map_or(1, |page| page.directory.samples_per_pixel.max(1) as usize);
         let channels = count("channels");
@@ -50,7 +53,7 @@ impl<'a> Description<'a> {
         }
         let unit = self.value("zunit").unwrap_or(self.unit("Z"));
         let spacing = self.value("spacing").or(self.along("Z", "scales"));
-        let (step, remark) = step_um(spacing.unwrap_or("1"), unit);
+        let (step, remark) = step_um(spacing.unwrap_or("1"), unit, "set it in ImageJ (Image > Properties)");
         let assumed = (spacing.is_none() && step.is_some()).then(|| {
             format!(
                 "the file states a unit ({unit}) and no spacing of the planes: it counts as 1 {unit}, as in ImageJ (Image > Properties)"
@@ -61,14 +64,17 @@ impl<'a> Description<'a> {
 
     /// Width and height of a pixel.
     pub fn pixel_um(&self, directory: &Directory) -> [Option<f64>; 2] {
-        [("X", directory.x_resolution), ("Y", directory.y_resolution)].map(|(axis, resolution)| {
-            let side = match self.along(axis, "scales") {
-                Some(scale) => finite(scale),
-                None => resolution.map(|pixels| 1.0 / pixels),
-            };
-            // One pixel per unit: the scale was never set.
-            Some(side.filter(|side| *side != 1.0)? * unit_um(self.unit(axis))?)
-        })
+        let side = |axis: &str, resolution: Option<f64>| match self.along(axis, "scales") {
+            Some(scale) => finite(scale),
+            None => resolution.map(|pixels| 1.0 / pixels),
+        };
+        let sides = [side("X", directory.x_resolution), side("Y", directory.y_resolution)];
+        // One pixel per unit: the scale was never set.
+        if sides.iter().all(|side| side.is_none_or(|side| side == 1.0)) {
+            return [None, None];
+        }
+        let [width, height] = sides;
+        [("X", width), ("Y", height)].map(|(axis, side)| Some(side? * unit_um(self.unit(axis))?))
     }
 }
 
@@ -148,6 +154,12 @@ mod tests {
         let unscaled = text.replace("0.25,0.25,2.0", "1.0,1.0,1.0").replace("\\u00B5m", "null");
         assert_eq!(positions(&pages(3, &unscaled)), Ok(None));
         assert_eq!(object_pixel_um(&pages(3, &unscaled)), (None, None));
+        let without_z = text.replace("2.0", "1.0").replace("5m,\\u00B5m\n", "5m,null\n");
+        let planes = of(&pages(3, &without_z)).unwrap();
+        assert_eq!((planes.positions_um, planes.remarks), (None, Vec::new()));
+        assert_eq!(object_pixel_um(&pages(3, &without_z)), (Some(0.25), None));
+        let unknown = of(&pages(3, &text.replace("X,Y,Z", "X,Y,Unknown"))).unwrap();
+        assert_eq!((unknown.pages.len(), unknown.positions_um), (3, None));
         let channels = text.replace("X,Y,Z", "X,Y,Channel").replace("channels=1", "channels=3");
         assert!(of(&pages(3, &channels)).unwrap_err().contains("3 channels"));
         let mut colour = pages(3, &text.replace("channels=1", "channels=3"));

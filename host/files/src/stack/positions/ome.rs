@@ -161,7 +161,9 @@ impl<'a> Metadata<'a> {
             return (Some(positions), None);
         }
         if let Some(size) = attribute(self.pixels(), "PhysicalSizeZ") {
-            let (step, remark) = step_um(size, attribute(self.pixels(), "PhysicalSizeZUnit").unwrap_or("um"));
+            let unit = attribute(self.pixels(), "PhysicalSizeZUnit").unwrap_or("um");
+            let remedy = "set PhysicalSizeZ and PhysicalSizeZUnit and save it again";
+            let (step, remark) = step_um(size, unit, remedy);
             return (step.map(|step| even(step, planes)), remark);
         }
         let stated: Vec<f64> = stated.into_iter().map(|(z, _)| z).collect();
@@ -247,6 +249,7 @@ mod tests {
         };
         remark("", in_frame, "(reference frame)");
         remark("PhysicalSizeZ='0,5'", ["''", "''"], "(0,5)");
+        remark("PhysicalSizeZ='0,5'", ["''", "''"], "not used; set PhysicalSizeZ and PhysicalSizeZUnit");
         remark("PhysicalSizeZ='2' PhysicalSizeZUnit='pixel'", ["''", "''"], "(pixel)");
         assert_eq!(
             planes("PhysicalSizeZ='1' PhysicalSizeZUnit='pixel'", ["'1'", "'1'"]),
@@ -307,6 +310,9 @@ mod tests {
         let twice = ome(&[data(2, 0, "a1"), data(2, 0, "a2")].concat());
         assert!(of(&twice, &["a1", "a2"]).unwrap_err().contains("one plane"));
         assert_eq!(of(&ome(&data(0, 0, "a1")), &["a1", "a2"]), Ok(None));
+        let backslash = ome(&[data(0, 0, "a\\u0031"), data(1, 0, "a2")].concat());
+        let backslash = backslash.replace("SizeZ='4'", "SizeZ='2'");
+        assert_eq!(of(&backslash, &["a\\u0031", "a2"]).unwrap().unwrap().pages, [0, 1]);
     }
 
     #[test]

@@ -122,7 +122,9 @@ pub fn unit(joints: &[Joint]) -> Known<Unit> {
     } else {
         (value, measured)
     };
-    let reason = format!("for the skeleton is {size:.2} long {what}, which makes {makes}");
+    // Of any unit, so by its digits.
+    let size: f64 = format!("{size:.2e}").parse().unwrap_or(size);
+    let reason = format!("for the skeleton is {size} long {what}, which makes {makes}");
     Known { value, source: Source::Guess { reason, sure } }
 }
 
@@ -216,10 +218,13 @@ mod tests {
     #[test]
     fn a_skeleton_of_no_usual_unit_is_of_a_typical_height() {
         // 10.3 m in metres, and less than a millimetre.
-        for (scale, usual) in [(10.3 / 17.0, "0.58 m (not a person"), (1e-5, "0.00 m (not a person")] {
+        for (scale, size, usual) in
+            [(10.3 / 17.0, "10.3", "0.58 m (not a person"), (1e-5, "0.00017", "0.00 m (not a person")]
+        {
             let found = unit(&body(scale, |p| p, STILL).joints);
             assert!((17.0 * scale * found.value.mm - 1700.0).abs() < 0.1 && !sure(&found), "{found:?}");
-            assert!(format!("{found:?}").contains(usual), "{found:?}");
+            let reason = format!("{found:?}");
+            assert!(reason.contains(usual) && reason.contains(&format!("is {size} long")), "{reason}");
         }
     }
 

@@ -1,42 +1,41 @@
 //! Tables with a row for each point: the frame or its time, perhaps the person, the point's name or number, and `x`, `y`, perhaps
 //! `z` and a confidence. They become tables with a row for each frame (and person) and columns `NAME_x`. Linear in the file.
 
+use std::cmp::Ordering;
 use std::collections::{HashMap, HashSet};
 
 use csv::StringRecord;
 
-use super::{TIMES, check_width, line};
+use super::{TIMES, check_width, coordinate, line};
 use crate::readers::{
-    keypoints::table::{CONFIDENCES, FRAMES, PEOPLE},
+    keypoints::table::{CONFIDENCES, FRAMES, PEOPLE, are_keypoints},
     recording::{RecordingError, number},
 };
 
 /// What columns of points' names are called, mostly with a word such as `_name` or `_id` after it.
 const POINTS: [&str; 8] = ["keypoint", "landmark", "bodypart", "joint", "marker", "point", "part", "node"];
 const WORDS: [&str; 5] = ["name", "id", "idx", "index", "number"];
-/// Cells of the other table for each row of this one; more are empty.
+/// Most cells of the wide table for each row; with more, most would be empty.
 const MOST_CELLS: usize = 20;
+/// Least columns `NAME_x` of a wide table; fewer may be those of a box.
+const LEAST_WIDE: usize = 3;
 
 struct Columns {
     point: usize,
-    /// Its name, if the points have numbers.
+    /// Text before the numbers, if the points have numbers.
     numbered: Option<&'static str>,
     /// Columns with the text after a point's name.
     fields: Vec<(usize, String)>,
     frame: Option<usize>,
     time: Option<usize>,
     person: Option<usize>,
-}
-
-impl Columns {
-    /// People of named points in space are prefixes of the names.
-    fn are_prefixes(&self) -> bool {
-        self.numbered.is_none() && self.fields.iter().any(|(_, field)| field == "z")
-    }
+    /// People of markers in space are prefixes of the names.
+    are_prefixes: bool,
 }
 
 /// Rows of a frame and person with their points.
 struct Group<'a> {
+    /// Number or time, or another name.
     frame: String,
     first: &'a StringRecord,
     rows: HashMap<usize, &'a StringRecord>,
@@ -47,6 +46,10 @@ pub fn wide(rows: Vec<StringRecord>) -> Result<Vec<StringRecord>, RecordingError
     let Some((header, below)) = rows.split_first() else { return Ok(rows) };
     let Some(columns) = columns(header, below) else { return Ok(rows) };
     let (names, groups) = grouped(&columns, header, below)?;
+    if names.is_empty() {
+        let reason = "it has no row of a point below its header".into();
+        return Err(RecordingError::Kind { kind: "CSV", reason });
+    }
     if names.len() * groups.len() > MOST_CELLS * below.len() {
         let reason = format!(
             "its {} rows hold {} different points in {} frames, expected most of the points in each frame",
@@ -56,7 +59,7 @@ pub fn wide(rows: Vec<StringRecord>) -> Result<Vec<StringRecord>, RecordingError
         );
         return Err(RecordingError::Kind { kind: "CSV", reason });
     }
-    let track = columns.person.filter(|_| !columns.are_prefixes());
+    let track = columns.person.filter(|_| !columns.are_prefixes);
     let kept = [(track, "track"), (columns.time, "time")];
     let kept: Vec<(usize, &str)> = kept.into_iter().filter_map(|(at, name)| Some((at?, name))).collect();
     let mut all = StringRecord::from(vec!["frame"]);
@@ -83,10 +86,13 @@ fn columns(header: &StringRecord, below: &[StringRecord]) -> Option<Columns> {
     let place = |known: &[&str]| header.iter().position(|column| is_of(column, known));
     let axes = ["x", "y", "z"].map(|axis| (place(&[axis, format!("{axis}_coord").as_str()]), axis));
     let sure = header.iter().position(|column| is_of(column, &CONFIDENCES));
-    if axes[0].0.is_none() || axes[1].0.is_none() {
+    let wide = header.iter().filter_map(coordinate).filter(|(_, axis)| *axis == 0).count();
+    if axes[0].0.is_none() || axes[1].0.is_none() || wide >= LEAST_WIDE {
         return None;
     }
+    let is_flat = axes[2].0.is_none();
     let fields = axes.into_iter().filter_map(|(at, axis)| Some((at?, axis.to_owned())));
+    let is_sure = is_flat || sure.is_some();
     let sure = sure.map(|at| (at, header[at].to_owned()));
     let named: Vec<(usize, &'static str)> =
         header.iter().enumerate().filter_map(|(at, column)| Some((at, point_column(column)?))).collect();
@@ -96,9 +102,13 @@ fn columns(header: &StringRecord, below: &[StringRecord]) -> Option<Columns> {
     };
     let by_name = named.iter().find(|(at, _)| !is_number(*at));
     let (point, word) = *by_name.or_else(|| named.first())?;
+    let count = below.iter().filter_map(|row| whole(row.get(point)?)).collect::<HashSet<u32>>().len();
+    // Numbers in a picture are those of keypoints, under any name of their column.
+    let numbered = by_name.is_none().then_some(if is_flat { "keypoint" } else { word });
     Some(Columns {
         point,
-        numbered: by_name.is_none().then_some(word),
+        numbered,
+        are_prefixes: !is_flat && numbered.is_none_or(|word| !are_keypoints(word, count, is_sure)),
         fields: fields.chain(sure).collect(),
         frame: place(&FRAMES),
         time: place(&TIMES),
@@ -123,19 +133,17 @@ fn whole(cell: &str) -> Option<u32> {
     Some(value as u32)
 }
 
-/// Names of all points, and the rows by frame and person.
+/// Names of all points, and the rows by frame and person, in the order of the frames' numbers or times.
 fn grouped<'a>(
     columns: &Columns,
     header: &StringRecord,
     below: &'a [StringRecord],
 ) -> Result<(Vec<String>, Vec<Group<'a>>), RecordingError> {
-    let are_prefixes = columns.are_prefixes();
     let (mut names, mut places) = (Vec::new(), HashMap::new());
     let (mut groups, mut known): (Vec<Group<'a>>, HashMap<(String, &str), usize>) =
         (Vec::new(), HashMap::new());
-    let mut times: HashMap<&str, usize> = HashMap::new();
-    // Without a frame and a time, a point that occurs again begins the next frame.
-    let (mut count, mut seen) = (0_usize, HashSet::new());
+    // Without a frame and a time: points of the first frame, and the number of rows.
+    let (mut order, mut seen, mut count) = (Vec::new(), HashSet::new(), 0_usize);
     for row in below {
         check_width(row, header)?;
         let person = columns.person.map_or("", |at| &row[at]);
@@ -143,30 +151,29 @@ fn grouped<'a>(
         if point.is_empty() {
             continue;
         }
-        let frame = match (columns.frame, columns.time) {
-            (Some(at), _) => row[at].to_owned(),
-            (None, Some(at)) => {
-                let next = times.len();
-                times.entry(&row[at]).or_insert(next).to_string()
-            }
-            (None, None) => {
-                if !seen.insert((person, point)) {
-                    count += 1;
-                    seen = HashSet::from([(person, point)]);
+        let frame = match columns.frame.or(columns.time) {
+            Some(at) => row[at].to_owned(),
+            None => {
+                if count == order.len() && seen.insert((person, point)) {
+                    order.push((person, point));
+                } else if order[count % order.len()] != (person, point) {
+                    return Err(unordered(row));
                 }
-                count.to_string()
+                count += 1;
+                ((count - 1) / order.len()).to_string()
             }
         };
-        let name = match (columns.numbered, whole(point)) {
+        let own = match (columns.numbered, whole(point)) {
             (Some(word), Some(number)) => format!("{word}_{number}"),
-            _ if are_prefixes && !person.is_empty() => format!("{person}:{point}"),
             _ => point.to_owned(),
         };
+        let is_prefixed = columns.are_prefixes && !person.is_empty();
+        let name = if is_prefixed { format!("{person}:{own}") } else { own };
         let place = *places.entry(name).or_insert_with_key(|name| {
             names.push(name.clone());
             names.len() - 1
         });
-        let key = (frame, if are_prefixes { "" } else { person });
+        let key = (frame, if columns.are_prefixes { "" } else { person });
         let group = *known.entry(key).or_insert_with_key(|(frame, _)| {
             groups.push(Group { frame: frame.clone(), first: row, rows: HashMap::new() });
             groups.len() - 1
@@ -180,7 +187,27 @@ fn grouped<'a>(
             return Err(RecordingError::Line { line: line(row), reason });
         }
     }
+    if let Some(row) = below.last().filter(|_| !count.is_multiple_of(order.len().max(1))) {
+        return Err(unordered(row));
+    }
+    let value = |group: &Group<'_>| number(&group.frame).filter(|value| value.is_finite());
+    if groups.iter().all(|group| value(group).is_some()) {
+        groups.sort_by(|a, b| value(a).partial_cmp(&value(b)).unwrap_or(Ordering::Equal));
+    }
+    if columns.frame.is_none() {
+        let mut known: HashMap<String, usize> = HashMap::new();
+        for group in &mut groups {
+            let next = known.len();
+            group.frame = known.entry(group.frame.clone()).or_insert(next).to_string();
+        }
+    }
     Ok((names, groups))
+}
+
+fn unordered(row: &StringRecord) -> RecordingError {
+    let reason =
+        "the rows do not repeat the same points, and no column numbers the frames: expected frame or time";
+    RecordingError::Line { line: line(row), reason: reason.into() }
 }
 
 #[cfg(test)]
@@ -242,8 +269,11 @@ mod tests {
         melted.sort_by_key(|row| row.split(',').nth(1).map(str::to_owned));
         expect_person("frame,keypoint,x,y,likelihood", &melted);
         let numbered = rows(|frame, number, _, [x, y]| format!("{frame},{number},{x},{y}"));
-        let remarks = expect_person("frame,keypoint,x,y", &numbered).remarks().join("; ");
-        assert!(remarks.contains("from 0 up to 16, in the layout COCO (a guess)"), "{remarks}");
+        for column in ["keypoint", "joint", "marker"] {
+            let found = expect_person(&format!("frame,{column},x,y"), &numbered);
+            let remarks = found.remarks().join("; ");
+            assert!(remarks.contains("from 0 up to 16, in the layout COCO (a guess)"), "{remarks}");
+        }
         let both =
             rows(|frame, number, name, [x, y]| format!("{},{number},{name},{x},{y}", 0.04 * frame as f64));
         assert_eq!(expect_person("time,landmark_id,landmark_name,x,y", &both).rate_hz, 25.0);
@@ -293,6 +323,50 @@ mod tests {
         assert!(!found.planar && found.frames.len() == 2);
         assert_eq!(found.by_name(1)["left_knee"], [1090.0, 2005.0, 480.0]);
         assert!(read("frame,person,marker,x,y,z", &in_space, Some(3)).is_err());
+        let numbered = rows(|frame, number, _, [x, y]| {
+            [1, 2].map(|person| format!("{frame},{person},{number},{x},{y},{}", 1000 * person)).join("\n")
+        });
+        let found = read("frame,person,marker,x,y,z", &numbered, None).expect("markers");
+        assert_eq!((found.frames.len(), found.by_name(1)["2:marker_5"]), (2, [118.0, 50.0, 2000.0]));
+    }
+
+    #[test]
+    fn frames_are_in_the_order_of_their_numbers_or_times() {
+        let mut melted = rows(|frame, _, name, [x, y]| {
+            let frame = frame as f64;
+            format!("{},{name},{},5,{}", 0.5 * frame, 10.0 * x + 100.0 * frame, 1900.0 - 10.0 * y)
+        });
+        melted.sort_by_key(|row| row.split(',').nth(1).map(str::to_owned));
+        // The first frame lacks the first point.
+        melted.remove(0);
+        for column in ["frame", "time"] {
+            let found = read(&format!("{column},marker,x,y,z"), &melted, None).expect("markers");
+            let nose = [0, 1].map(|frame| found.by_name(frame)["nose"][0]);
+            assert!(!found.by_name(0).contains_key("left_ankle"));
+            assert_eq!(nose, [1000.0, 1100.0], "{column}");
+        }
+    }
+
+    #[test]
+    fn without_frames_and_times_rows_that_do_not_repeat_the_same_points_are_refused() {
+        let ordered = rows(|_, _, name, [x, y]| format!("{name},{x},{y}"));
+        let mut melted = ordered.clone();
+        melted.sort();
+        let without = |place: usize| [&ordered[..place], &ordered[place + 1..]].concat();
+        for (rows, line) in [(melted, 4), (without(0), 26), (without(13), 15)] {
+            let error = read("keypoint,x,y", &rows, None).expect_err("no order").to_string();
+            assert!(error.starts_with(&format!("line {line}: the rows do not repeat the same")), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_wide_table_with_other_columns_stays_one() {
+        let names: String = BODY.iter().map(|(_, name, _)| format!(",{name}_x,{name}_y,{name}_z")).collect();
+        let place = |[x, y]: &[f64; 2]| format!(",{},5,{}", 10.0 * x, 1900.0 - 10.0 * y);
+        let places: String = BODY.iter().map(|(_, _, own)| place(own)).collect();
+        let rows = ["0,start", "1,walk"].map(|event| format!("{event},0.1,0.2{places}"));
+        let found = read(&format!("frame,marker,x,y{names}"), &rows, None).expect("markers");
+        assert_eq!(found.by_name(1)["left_knee"], [1090.0, 5.0, 480.0]);
     }
 
     #[test]
@@ -305,10 +379,12 @@ mod tests {
         assert!(error.contains("100 rows hold 100 different points in 100 frames"), "{error}");
         let error = read("frame,keypoint,x,y", &["0,nose,1".into(), "0,left_knee,1,2".into()], None);
         assert!(error.expect_err("a cell too few").to_string().starts_with("line 2: 3 values"));
+        let error = read("frame,keypoint,x,y", &[], None).expect_err("a header").to_string();
+        assert!(error.contains("no row of a point below its header"), "{error}");
     }
 
     #[test]
-    fn openpose_numbers_without_ankles_are_distinguished_from_coco_by_the_neck() {
+    fn openpose_numbers_without_all_points_are_distinguished_from_coco_by_the_neck() {
         let places: [[f64; 2]; 13] = [
             [100.0, 30.0],
             [100.0, 50.0],
@@ -325,9 +401,14 @@ mod tests {
             [109.0, 142.0],
         ];
         let row = |(number, [x, y]): (usize, &[f64; 2])| format!("0,{number},{x},{y}");
-        let rows: Vec<String> = places.iter().enumerate().map(row).collect();
-        let found = read("frame,keypoint,x,y", &rows, None).expect("a person");
-        assert!(found.remarks().join("; ").contains("in the layout OpenPose COCO"), "{:?}", found.remarks());
-        assert!(found.by_name(0)["left knee"][0] > found.by_name(0)["right knee"][0]);
+        // BODY_25 has the middle of the hips; here both ankles, too.
+        let with_hips = [&places[..8], &[[100.0, 100.0]], &places[8..], &[[109.0, 184.0]]].concat();
+        for (places, layout) in [(places.to_vec(), "OpenPose COCO"), (with_hips, "OpenPose BODY_25")] {
+            let rows: Vec<String> = places.iter().enumerate().map(row).collect();
+            let found = read("frame,keypoint,x,y", &rows, None).expect("a person");
+            let remarks = found.remarks().join("; ");
+            assert!(remarks.contains(&format!("in the layout {layout} (")), "{remarks}");
+            assert!(found.by_name(0)["left knee"][0] > found.by_name(0)["right knee"][0]);
+        }
     }
 }

@@ -14,8 +14,8 @@ use crate::{readers::recording::RecordingError, silhouette::aliases};
 const KEYS: [&str; 3] = ["name", "part", "id"];
 /// Points of COCO, the usual layout of programs that leave points out.
 const USUAL: usize = 17;
-/// Points of OpenPose's COCO layout, of which the second is the neck.
-const WITH_NECK: usize = 18;
+/// Points of OpenPose's COCO layout and of BODY_25, of which the second is the neck.
+const WITH_NECK: [usize; 2] = [18, 25];
 /// Fewer numbers are not those of a body.
 pub const LEAST: usize = 6;
 
@@ -99,8 +99,8 @@ fn by_number(labels: &[String], frames: &[Vec<Person>]) -> Option<Order> {
     };
     let candidates = [1_usize, 0].into_iter().filter(|first| *first == 0 || least == 1).flat_map(|first| {
         let counts = match spatial::has_neck(people(), point(first)) {
-            Some(true) => [reach - first, WITH_NECK],
-            _ => [USUAL, reach - first],
+            Some(true) => [&[reach - first][..], &WITH_NECK].concat(),
+            _ => vec![USUAL, reach - first],
         };
         let counts = counts.into_iter().filter(move |count| reach <= first + count);
         counts.filter_map(Layout::of).map(move |layout| (first, layout))

@@ -110,13 +110,15 @@ pub fn followed(frames: &[Vec<Person>]) -> People {
     People { tracks: all.iter().take(MOST).map(points).collect(), others, places }
 }
 
-/// One person of all frames, if none of them shows two and each person stays in place for less than half of them: a collection of pictures.
+/// One person of all frames, if none of them shows two, and people stay in place for less than two frames on average and each for
+/// less than half of them: a collection of pictures.
 fn alone(all: &[Followed]) -> Option<Followed> {
     let mut seen: Vec<(usize, usize)> = all.iter().flat_map(|track| &track.seen).copied().collect();
     seen.sort_unstable();
     let are_single = seen.windows(2).all(|two| two[0].0 < two[1].0);
     let is_leaping = all.iter().all(|track| 2 * track.seen.len() < seen.len());
-    (are_single && is_leaping && !seen.is_empty()).then(|| Followed { seen, ..begun([0.0; 3], 0.0) })
+    let are_short = 2 * all.len() > seen.len();
+    (are_single && is_leaping && are_short).then(|| Followed { seen, ..begun([0.0; 3], 0.0) })
 }
 
 /// Whether the file's numbers tell people apart: not if most frames of several people repeat one, as those of AlphaPose

@@ -52,8 +52,10 @@ pub fn read(
     if bodies(&points).is_empty() {
         numbers = numbers_of(&points).unwrap_or_default();
         // Next to the points of a person these are the x1, y1, x2 and y2 of a box.
-        let (others, has_depth) = points_of(columns, numbered)?;
-        if let Some(found) = numbers_of(&others).filter(|_| numbers.is_empty()) {
+        if numbers.is_empty()
+            && let Ok((others, has_depth)) = points_of(columns, numbered)
+            && let Some(found) = numbers_of(&others)
+        {
             (points, has_z, numbers) = (others, has_depth, found);
         }
     }
@@ -164,8 +166,7 @@ fn body<'a>(points: &'a [Column], prefix: &str) -> Body<'a> {
     known.filter_map(|(at, name)| Some((place(&name)?, *own.get(at)?))).collect()
 }
 
-/// Numbers after a text that all names share: of as many points as a layout has, or of what the text calls keypoints. Other
-/// numbered points in space without confidences are markers.
+/// Numbers after a text that all names share, of keypoints.
 fn numbers_of(points: &[Column]) -> Option<Vec<String>> {
     let parts = |point: &Column| {
         let text = point.name.trim_end_matches(|c: char| c.is_ascii_digit());
@@ -173,12 +174,18 @@ fn numbers_of(points: &[Column]) -> Option<Vec<String>> {
     };
     let (texts, numbers): (Vec<String>, Vec<String>) = points.iter().map(parts).unzip();
     let text = texts.first()?;
-    let is_named = ["keypoint", "landmark"].iter().any(|word| text.contains(word));
-    let is_layout = Layout::of(points.len()).is_some()
-        && points.iter().all(|point| point.depth.is_none() || point.sure.is_some());
+    let is_sure = points.iter().all(|point| point.depth.is_none() || point.sure.is_some());
     let are_alike =
         texts.iter().all(|other| other == text) && numbers.iter().all(|number| !number.is_empty());
-    (are_alike && (is_layout || is_named)).then_some(numbers)
+    (are_alike && are_keypoints(text, points.len(), is_sure)).then_some(numbers)
+}
+
+/// Whether numbered points are keypoints by two of: their text, as many as a layout has, and no depth or a confidence. Others are
+/// markers.
+pub(in crate::readers) fn are_keypoints(text: &str, count: usize, is_sure: bool) -> bool {
+    let is_named = ["keypoint", "landmark"].iter().any(|word| text.contains(word));
+    let is_layout = Layout::of(count).is_some();
+    if is_sure { is_named || is_layout } else { is_named && is_layout }
 }
 
 /// Name of a point, and the kind of its confidence.
@@ -438,11 +445,15 @@ mod tests {
             let remarks = found.remarks().join("; ");
             assert!(remarks.contains("in the layout MediaPipe"), "{remarks}");
         }
-        // Markers in space have no confidences.
-        let header: String = (1..=17).map(|n| format!(",M{n}_x,M{n}_y,M{n}_z")).collect();
-        let row: String = (1..=17).map(|n| format!(",{},{},{}", 10 * n, 7 * n, 100 * n)).collect();
-        let found = read(&format!("frame{header}\n0{row}\n"), None).expect("markers");
-        assert!(!found.planar && found.names[0] == "M1");
+        // Markers in space have no confidences; other columns may be named as twice the same number.
+        for (text, count, others) in [("M", 17, ""), ("landmark_", 60, ""), ("M", 13, ",v1,V1,x1,x1_coord")] {
+            let header: String =
+                (1..=count).map(|n| format!(",{text}{n}_x,{text}{n}_y,{text}{n}_z")).collect();
+            let row: String = (1..=count).map(|n| format!(",{},{},{}", 10 * n, 7 * n, 100 * n)).collect();
+            let cells = ",5".repeat(others.matches(',').count());
+            let found = read(&format!("frame{header}{others}\n0{row}{cells}\n"), None).expect("markers");
+            assert!(!found.planar && found.names[0] == format!("{text}1"), "{:?}", found.names);
+        }
     }
 
     #[test]

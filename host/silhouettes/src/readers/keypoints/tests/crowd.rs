@@ -35,7 +35,7 @@ fn a_person_is_followed_among_false_detections() {
 }
 
 #[test]
-fn a_collection_of_pictures_of_one_person_each_is_one_person_and_people_one_after_the_other_are_two() {
+fn a_collection_of_pictures_of_one_person_each_is_one_person_and_people_one_after_the_other_are_several() {
     let read_at = |places: &[f64]| {
         let of = |x: &f64| format!(r#"{{"pose_keypoints_2d":{}}}"#, flat(&person(layout(25), *x)));
         let frames: Vec<String> = places.iter().map(|x| format!(r#"{{"people":[{}]}}"#, of(x))).collect();
@@ -49,4 +49,7 @@ fn a_collection_of_pictures_of_one_person_each_is_one_person_and_people_one_afte
     let after_each_other: Vec<f64> = (0..12).map(|n| if n < 8 { 100.0 } else { 5000.0 }).collect();
     let (seen, remarks) = read_at(&after_each_other);
     assert!(seen == 8 && remarks.contains("2 people"), "{seen}: {remarks}");
+    let three: Vec<f64> = (0..90).map(|n| 1000.0 * f64::from(1 + n / 30)).collect();
+    let (seen, remarks) = read_at(&three);
+    assert!(seen == 30 && remarks.contains("3 people"), "{seen}: {remarks}");
 }
