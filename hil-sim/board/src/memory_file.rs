@@ -30,7 +30,7 @@ fn aside(path: &Path) -> PathBuf {
     path.with_added_extension(format!("partial-{}", std::process::id()))
 }
 
-/// Fails if [`write`] cannot create the file, which it calls only at the end of a run.
+/// Fails if [`write()`], which comes at the end of a run, could not create the file.
 pub fn check_writable(path: &Path) -> Result<(), SimError> {
     let aside = aside(path);
     fs::write(&aside, []).and_then(|()| fs::remove_file(&aside)).map_err(failed("write", path))
