@@ -31,7 +31,8 @@ use ndarray::{Array2, ArrayView2, Axis};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::optics::{Distortion, Optics};
+use crate::brightness;
+use crate::optics::{Distortion, Optics, OpticsError};
 use crate::reason::Reason;
 use balance::Gain;
 use bands::Bands;
@@ -153,7 +154,7 @@ pub enum PrepareError {
         because: Option<Mismatch>,
     },
     #[error(transparent)]
-    Optics(#[from] crate::optics::OpticsError),
+    Optics(#[from] OpticsError),
     #[error(transparent)]
     Camera(#[from] CameraError),
 }
@@ -294,9 +295,12 @@ pub(crate) fn prepare_after(
     let noise = settings.noise.or_else(|| noise::of_pair(far.view(), near.view()));
     let recorded = Recorded { near: near.clone(), distortion };
     let marks = marks.map(|marks| Some(straight::reasons(marks.as_ref(), size, &distortion)));
+    let shows = |image: &Array2<f32>| image.iter().any(|value| value.is_finite());
+    let had_shown = shows(&far) && shows(&near);
     let pair = [far, near].map(|image| straight::image(image.view(), &distortion));
-    if !pair.iter().all(|image| image.iter().any(|value| value.is_finite())) {
-        return Err(distortion.leaves_nothing(size).into());
+    if had_shown && !pair.iter().all(shows) {
+        let ([cx, cy], (height, width)) = (distortion.centre_px(), size);
+        return Err(OpticsError::NothingStraight { cx, cy, width, height }.into());
     }
     finish(last, pair, Some(recorded), marks, optics, &PrepareSettings { noise, ..*settings })
 }
@@ -336,7 +340,11 @@ fn finish(
     let size = far.dim();
     let measured = settings.noise.or_else(|| noise::of_pair(far.view(), near.view()));
     let noise = measured.unwrap_or_default();
-    let noise = if settings.coding > 0.0 { noise.coded(settings.coding, mean_of(&far)) } else { noise };
+    let noise = if settings.coding > 0.0 {
+        noise.coded(settings.coding, brightness::mean(far.view()))
+    } else {
+        noise
+    };
     let mut report = Report::default();
     let moved = |warp: Warp| match &recorded {
         Some(Recorded { near, distortion }) => {
@@ -398,15 +406,6 @@ fn finish(
         }
     }
     Ok(Prepared { far, near, reasons, noise, report })
-}
-
-/// Of the pixels with a value.
-fn mean_of(image: &Array2<f32>) -> f64 {
-    let (sum, count) = image
-        .iter()
-        .filter(|value| value.is_finite())
-        .fold((0.0, 0.0), |(sum, count), value| (sum + f64::from(*value), count + 1.0));
-    sum / f64::max(count, 1.0)
 }
 
 fn part_of(reasons: &Array2<u8>, reason: Reason) -> f64 {

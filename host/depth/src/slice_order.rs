@@ -18,11 +18,13 @@ const LEFT_OF_ABSENT: f64 = 0.75;
 const MORE_THAN_ABSENT: f64 = 0.15;
 /// Least excess that is removed, relative to the range of sharpness.
 const LEAST: f64 = 0.04;
-/// Least part of the blocks that gain, least gain of a block relative to its range, and blocks that lose relative to these.
+/// Least part of the blocks that gain, least gain of a block relative to its range, and blocks that lose relative to these. In 94 public
+/// stacks the same slices were exchanged with 0.25 to 0.4; a composed picture next to the focus of most blocks gained in 0.32.
 const GAINING: f64 = 0.3;
 const GAIN: f64 = 0.02;
 const LOSING: f64 = 0.25;
 /// Largest excess of a wrapped stack from its first slice on, or without a composed picture, relative to that of all in the order given.
+/// Wrapped public stacks had up to 0.46, good ones with one bad slice at least 0.54.
 const LEFT_OF_ALL: f64 = 0.5;
 /// Sharpness of a composed picture relative to the sharpest slice, and least part of the blocks that have it.
 const COMPOSED: f64 = 0.8;

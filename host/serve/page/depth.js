@@ -149,7 +149,8 @@ export function make(host, remember) {
       for (const part of [first, names.filter((layer) => !first.includes(layer))]) {
         const loaded = await Promise.all(part.map((layer) => load(`/api/captures/${encodeURIComponent(name)}/files/${FILES[layer]}`)));
         if (loading !== show.loading) return;
-        if (part === first) replace({});
+        // What is loaded again stays on screen, and its buttons in use, until then.
+        if (part === first) replace(show.of === name ? Object.fromEntries(names.filter((layer) => show.maps[layer]).map((layer) => [layer, show.maps[layer]])) : {});
         part.forEach((layer, at) => { show.maps[layer] = loaded[at]; });
         await refresh();
       }

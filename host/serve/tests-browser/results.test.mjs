@@ -303,3 +303,22 @@ test("a picture of a new pair that comes after its files does not undo the choic
   assert.ok(await reasons.isVisible());
   await page.context().close();
 });
+
+test("layers stay in use while the files of the shown capture are loaded again", async () => {
+  const page = await open(browser, server.address);
+  await page.getByRole("button", { name: "Capture pair" }).click();
+  const reason = page.locator("button[data-layer=reason]");
+  await page.locator("button[data-layer=reason]:enabled").waitFor();
+  await page.locator("#view-depth").getByRole("button", { name: "Compute depth" }).waitFor();
+  let release;
+  const held = new Promise((asked) => page.route("**/files/reason.png", (route) => { release = () => route.continue(); asked(); }));
+  await page.locator("#view-depth").getByRole("button", { name: "Compute depth" }).click();
+  await held;
+  // The layers that are loaded first are drawn by now.
+  await page.evaluate(() => new Promise((done) => setTimeout(done, 300)));
+  assert.ok(await reason.isEnabled());
+  await reason.click();
+  await release();
+  await page.locator(".reasons span", { hasText: "%" }).first().waitFor();
+  await page.context().close();
+});

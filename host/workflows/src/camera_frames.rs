@@ -24,9 +24,10 @@ const RESPONSE: &str = "response.npy";
 const BAD: &str = "bad.png";
 /// Least brightness of a flat frame relative to the brightest.
 const DARKEST: f64 = 0.5;
-/// Largest distance of a dark frame's mean from the darkest one's, relative to the flat frames' mean.
+/// Largest distance of a dark frame's mean from the darkest one's, relative to the flat frames' mean: dark current may differ by some
+/// per cent, a frame with light by much more.
 const UNLIKE: f64 = 0.05;
-/// Part of full scale below which light is weak.
+/// Part of full scale below which light is weak: a step of 8 bits is then more than 4 % of it.
 const WEAK: f64 = 0.1;
 
 /// Learn a camera's dark frame, the response of its pixels and its bad ones, for `farnear depth --camera-frames`.
@@ -243,20 +244,8 @@ pub fn read(folder: &Path) -> Result<CameraFrames> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Mutex;
-
     use super::*;
-    use crate::context::{Cancel, Progress, Unattended};
-
-    #[derive(Default)]
-    struct Heard(Mutex<Vec<String>>);
-
-    impl Progress for Heard {
-        fn info(&self, _: &str) {}
-        fn warn(&self, what: &str) {
-            self.0.lock().unwrap().push(what.into());
-        }
-    }
+    use crate::context::Heard;
 
     struct Bench(tempfile::TempDir);
 
@@ -296,10 +285,8 @@ mod tests {
         fn tried(&self, flat: &[&PathBuf], dark: &[&PathBuf]) -> (Result<CameraFigures>, Vec<String>) {
             let [flat, dark] = [flat, dark].map(|files| files.iter().copied().cloned().collect());
             let heard = Heard::default();
-            let context = Context::new(&heard, &Unattended, Cancel::default());
-            let found = calibrate(&CalibrateCameraRequest { flat, dark, out: self.path("out") }, &context);
-            let said = heard.0.lock().unwrap().clone();
-            (found, said)
+            let request = CalibrateCameraRequest { flat, dark, out: self.path("out") };
+            (calibrate(&request, &heard.context()), heard.said())
         }
 
         fn refused(&self, flat: &[&PathBuf], dark: &[&PathBuf], phrases: [&str; 3]) {

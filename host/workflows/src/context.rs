@@ -1,5 +1,7 @@
 //! Progress, prompts and cancellation for workflows: no terminal, keyboard or signals, only the caller's [`Context`].
 
+#[cfg(test)]
+use std::sync::Mutex;
 use std::{
     sync::{
         Arc,
@@ -127,6 +129,43 @@ impl Questions for Unattended {
 impl Context<'static> {
     pub fn unattended() -> Self {
         Self::new(&Unattended, &Unattended, Cancel::default())
+    }
+}
+
+/// Records what is reported.
+#[cfg(test)]
+#[derive(Default)]
+pub(crate) struct Heard(Mutex<Vec<String>>);
+
+#[cfg(test)]
+impl Heard {
+    pub fn context(&self) -> Context<'_> {
+        Context::new(self, &Unattended, Cancel::default())
+    }
+
+    pub fn said(&self) -> Vec<String> {
+        self.0.lock().unwrap().clone()
+    }
+}
+
+#[cfg(test)]
+impl Progress for Heard {
+    fn info(&self, what: &str) {
+        self.0.lock().unwrap().push(what.into());
+    }
+}
+
+/// Records counts and their totals.
+#[cfg(test)]
+#[derive(Default)]
+pub(crate) struct Counted(pub Mutex<Vec<(usize, Option<usize>)>>);
+
+#[cfg(test)]
+impl Progress for Counted {
+    fn info(&self, _: &str) {}
+
+    fn advance(&self, _: &'static str, done: usize, total: Option<usize>) {
+        self.0.lock().unwrap().push((done, total));
     }
 }
 

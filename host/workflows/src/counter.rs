@@ -33,26 +33,16 @@ impl<'a> Counter<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::{Cancel, Progress, Unattended};
+    use crate::context::Counted;
     use rayon::prelude::*;
-
-    #[derive(Default)]
-    struct Heard(Mutex<Vec<(usize, Option<usize>)>>);
-
-    impl Progress for Heard {
-        fn info(&self, _: &str) {}
-        fn advance(&self, _: &'static str, done: usize, total: Option<usize>) {
-            self.0.lock().unwrap_or_else(PoisonError::into_inner).push((done, total));
-        }
-    }
 
     #[test]
     fn counts_rise_by_one_from_any_thread() {
-        let heard = Heard::default();
-        let context = Context::new(&heard, &Unattended, Cancel::default());
+        let counted = Counted::default();
+        let context = Context { progress: &counted, ..Context::unattended() };
         let counter = Counter::new(&context, "clips");
         (0..100).into_par_iter().for_each(|_| counter.one(Some(100)));
         let expected: Vec<_> = (1..=100).map(|done| (done, Some(100))).collect();
-        assert_eq!(*heard.0.lock().unwrap_or_else(PoisonError::into_inner), expected);
+        assert_eq!(counted.0.into_inner().unwrap(), expected);
     }
 }

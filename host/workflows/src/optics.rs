@@ -26,7 +26,8 @@ use crate::{
 
 pub const KIND: &str = "the optics file";
 
-/// Largest distance of the optical axis from the middle of whole images, in their sides.
+/// Largest distance of the optical axis from the middle of whole images, in their sides. A matrix for images of twice or half the size
+/// is off by 0.5 or 0.25.
 const OFF_CENTRE: f64 = 0.2;
 
 #[derive(Clone, Debug)]

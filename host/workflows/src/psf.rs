@@ -6,6 +6,7 @@ use farnear_depth::psf::{Psf, RadialPsf};
 use farnear_files::{
     image_file::{self, Samples},
     map,
+    video::pictures,
 };
 
 use crate::{
@@ -20,7 +21,7 @@ const NOT_ROUND: f64 = 0.1;
 pub enum PsfSource {
     Named(Psf),
     Image {
-        /// PNG, TIFF, JPEG, PGM or .npy.
+        /// A picture or a .npy.
         file: PathBuf,
         /// Blur radius (edge of the aperture) in pixels of the image. Default: half of the shorter side.
         radius_px: Option<f64>,
@@ -39,9 +40,8 @@ impl std::str::FromStr for PsfSource {
     fn from_str(text: &str) -> std::result::Result<Self, NoPsf> {
         let (file, radius) = text.rsplit_once(",radius=").map_or((text, None), |(file, px)| (file, Some(px)));
         let ending = Path::new(file).extension().map(|ending| ending.to_string_lossy().to_lowercase());
-        let is_image = ending.is_some_and(|ending| {
-            ["png", "npy", "tif", "tiff", "jpg", "jpeg", "pgm"].contains(&ending.as_str())
-        });
+        let is_image = ending
+            .is_some_and(|ending| pictures::EXTENSIONS.iter().chain(&["npy"]).any(|image| ending == *image));
         if !is_image {
             return text.parse().map(Self::Named).map_err(|error| NoPsf(format!("{error}")));
         }

@@ -7,7 +7,10 @@ use std::{
     time::{Duration, Instant, SystemTime},
 };
 
-use farnear_files::image_file::{decode_grey, exposure_time};
+use farnear_files::{
+    image_file::{decode_grey, exposure_time},
+    video::pictures,
+};
 use farnear_protocol::{
     message::{ShotRecord, TriggerMode},
     units::Micros,
@@ -23,7 +26,6 @@ use crate::describe::trigger_name;
 const POLL: Duration = Duration::from_millis(20);
 /// A non-image file is invalid after this time without a change.
 const QUIET: Duration = Duration::from_secs(2);
-const ENDINGS: [&str; 7] = ["png", "tif", "tiff", "jpg", "jpeg", "pgm", "ppm"];
 
 /// Uses new image files in order of writing.
 #[derive(Debug)]
@@ -71,7 +73,7 @@ impl FolderCamera {
             let path = entry.map_err(failed)?.path();
             let ending =
                 path.extension().and_then(|ending| ending.to_str()).unwrap_or("").to_ascii_lowercase();
-            if !ENDINGS.contains(&ending.as_str()) {
+            if !pictures::EXTENSIONS.contains(&ending.as_str()) {
                 continue;
             }
             // A file renamed meanwhile is no longer an image.

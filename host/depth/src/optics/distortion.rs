@@ -64,12 +64,6 @@ impl Distortion {
         self.centre_px
     }
 
-    /// The error for images of (height, width) of which no pixel is left.
-    pub(crate) fn leaves_nothing(&self, (height, width): (usize, usize)) -> OpticsError {
-        let [cx, cy] = self.centre_px;
-        OpticsError::NothingStraight { cx, cy, width, height }
-    }
-
     /// Sensor position of the pinhole's pixel `[u, v]`.
     pub fn distorted(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let [[fx, fy], [cx, cy]] = [self.focal_px, self.centre_px];

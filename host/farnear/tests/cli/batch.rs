@@ -391,9 +391,14 @@ fn a_second_run_repeats_the_figures_of_the_first() {
         "{first:?}"
     );
     // Found before the jobs, not after them.
-    let nowhere = format!("{manifest}/figures.csv");
-    let refused = farnear(&["batch", &manifest, "--summary", &nowhere]).output().expect("the program starts");
-    assert!(!refused.status.success() && refused.stdout.is_empty());
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("absent", folder.text("link")).expect("a link");
+        let nowhere = folder.text("link/figures.csv");
+        let refused =
+            farnear(&["batch", &manifest, "--summary", &nowhere]).output().expect("the program starts");
+        assert!(!refused.status.success() && refused.stdout.is_empty());
+    }
     let table = folder.text("tables/figures.csv");
     let second = run(&["--summary", &table]);
     for (mut first, second) in first.into_iter().zip(&second) {

@@ -50,7 +50,7 @@ fn unprintable_targets_are_rejected_without_output() {
     fails(
         &mut farnear(&["target", "--optics", rig_optics(), "--out", &nowhere]),
         2,
-        &["none/target.pdf", "no folder"],
+        &["none/target.pdf", "does not exist"],
     );
     assert!(folder.listing().is_empty(), "{:?}", folder.listing());
 }

@@ -60,10 +60,8 @@ impl Pages {
     pub fn decode(&self, number: usize) -> Result<Decoded, ImageError> {
         let file =
             File::open(&self.path).map_err(|source| ImageError::Read { path: self.path.clone(), source })?;
-        let page = number.checked_sub(1).and_then(|index| self.pages.get(index));
-        let page = page.ok_or_else(|| no_page(number, &self.pages));
-        let decoded =
-            page.and_then(|page| decode_page(BufReader::new(file), self.size, page, Signed::Refused));
+        let decoded = page(&self.pages, number)
+            .and_then(|page| decode_page(BufReader::new(file), self.size, page, Signed::Refused));
         decoded.map_err(|reason| {
             let path = format!("{}#{number}", self.path.display()).into();
             ImageError::Format { path, reason }
@@ -117,18 +115,16 @@ fn pages<S: Source + ?Sized>(source: &S) -> Result<Vec<Page>, String> {
     Ok(pages)
 }
 
-fn no_page(number: usize, pages: &[Page]) -> String {
-    format!("it has no page {number}: pages are numbered from 1 to {}", pages.len())
+fn page(pages: &[Page], number: usize) -> Result<&Page, String> {
+    let page = number.checked_sub(1).and_then(|index| pages.get(index));
+    page.ok_or_else(|| format!("it has no page {number}: pages are numbered from 1 to {}", pages.len()))
 }
 
 /// Decodes page `number` (from 1), or the only one.
 pub(super) fn decode(bytes: &[u8], number: Option<usize>, signed: Signed) -> Result<Decoded, String> {
     let pages = pages(bytes)?;
     let page = match (number, pages.as_slice()) {
-        (Some(number), _) => {
-            let page = number.checked_sub(1).and_then(|index| pages.get(index));
-            Some(page.ok_or_else(|| no_page(number, &pages))?)
-        }
+        (Some(number), all) => Some(page(all, number)?),
         (None, [page]) => Some(page),
         (None, _) => None,
     };

@@ -355,9 +355,10 @@ mod tests {
         assert!(
             read(b"frame,A_x,A_y,B_z\n").expect_err("mixed").to_string().contains("marker A has no column")
         );
-        assert!(
-            read(b"A_x,A_y,A_z,A_x\n").expect_err("twice").to_string().contains("two columns are named A_x")
-        );
+        for (header, column) in [("A_x,A_y,A_z,A_x\n", "A_x"), ("frame,x0,y0,x1,y1,x0\n", "x0")] {
+            let error = read(header.as_bytes()).expect_err("twice").to_string();
+            assert!(error.contains(&format!("two columns are named {column}")), "{error}");
+        }
         for short in ["A_x,A_y,A_z\n1,2,3\n1,2\n", "A_x,A_y,A_z\r\n1,2,3\r\n1,2\r\n"] {
             let error = read(short.as_bytes()).expect_err("short").to_string();
             assert!(error.starts_with("line 3"), "{error}");

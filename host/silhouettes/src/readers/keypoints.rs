@@ -7,7 +7,7 @@ mod document;
 mod json;
 mod labels;
 mod layouts;
-mod names;
+pub mod names;
 mod people;
 mod points;
 mod spatial;

@@ -149,8 +149,12 @@ pub(super) fn check_same(request: &EvaluateRequest, model: &Model) -> Result<()>
     for (own, known) in request.same() {
         let same = || format!("{own}={known}");
         if !of_samples.contains(own) {
-            let found = of_samples.into_iter().collect::<Vec<_>>().join(", ");
-            let expected = format!("the samples have no activity `{own}`, only {found}");
+            // The names of a blind set are known by its recorded opening only.
+            let only = match request.open_blind_set {
+                Some(_) => String::new(),
+                None => format!(", only {}", of_samples.into_iter().collect::<Vec<_>>().join(", ")),
+            };
+            let expected = format!("the samples have no activity `{own}`{only}");
             return Err(WorkflowError::parameter("same", same(), expected));
         }
         if !model.activities().iter().any(|activity| activity == known) {

@@ -230,19 +230,8 @@ fn seed_of(path: &Path, number: usize) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Mutex;
-
     use super::*;
-    use crate::{Cancel, Progress, Unattended};
-
-    #[derive(Default)]
-    struct Heard(Mutex<Vec<String>>);
-
-    impl Progress for Heard {
-        fn info(&self, what: &str) {
-            self.0.lock().expect("no panic").push(what.into());
-        }
-    }
+    use crate::context::Heard;
 
     #[test]
     fn a_recording_without_a_frame_rate_is_reported_and_its_views_are_one_performance() {
@@ -265,14 +254,14 @@ mod tests {
             ..TrainRequest::default()
         };
         let heard = Heard::default();
-        let found = performances(&request, &Context::new(&heard, &Unattended, Cancel::default()));
+        let found = performances(&request, &heard.context());
         let found = found.expect("clips");
         assert!(
             found.len() == 1 && found[0].len() > 1,
             "{:?}",
             found.iter().map(Vec::len).collect::<Vec<_>>()
         );
-        let heard = heard.0.into_inner().expect("no panic");
+        let heard = heard.said();
         assert!(
             heard.iter().any(|line| line.ends_with("walk.csv: the frame rate is unknown, 30/s is assumed"))
         );

@@ -212,9 +212,7 @@ fn rmse_mm(errors: &[[f64; 2]]) -> f64 {
 /// Names patterns whose error remains: a distance that was written down wrongly, or exchanged.
 fn unlike_others(errors: &[[f64; 2]]) -> Vec<String> {
     let rmse: Vec<f64> = errors.iter().map(|error| rmse_mm(std::slice::from_ref(error))).collect();
-    let mut sorted = rmse.clone();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let median = sorted[sorted.len() / 2];
+    let Some(median) = quantile::of_values(rmse.iter().copied(), 0.5) else { return Vec::new() };
     let unlike = |(_, mm): &(usize, &f64)| **mm > UNLIKE * median;
     let named = |(index, mm): (usize, &f64)| {
         let [mm, usual] = [*mm, median].map(|mm| rounded_for(median, mm, 3));

@@ -24,6 +24,11 @@ pub struct Part {
 }
 
 impl Part {
+    /// Whether a map of (height, width) can be this part.
+    pub fn fits(&self, (height, width): (usize, usize)) -> bool {
+        self.x + width <= self.image_width && self.y + height <= self.image_height
+    }
+
     /// Optical axis (centre of the images) in the map: column and row.
     pub fn axis_px(&self) -> [f64; 2] {
         let of = |size: usize, begin: usize| 0.5 * (size as f64 - 1.0) - begin as f64;

@@ -12,7 +12,7 @@ const SHALLOW_PX: f64 = 3.0;
 /// 0.76 or more, in dark scenes 0.24 or less.
 const STRAIGHT: f64 = 0.7;
 const CLOSE_PX: f64 = 1.5;
-/// Largest code of a border.
+/// Largest code of a border of 8 bits: JPEG of usual quality left up to 5 in public stacks.
 const BLACK: f32 = 8.0;
 /// Largest step of the codes that count.
 const CODE_STEP: f32 = 1.0 / 255.0;

@@ -31,11 +31,14 @@ const FOREIGN: f64 = 0.5;
 /// Correlation without detail from which a frame shows the scene. With frames that are far out of focus it was 0.66 to 0.98, with
 /// moved, turned and foreign ones at most 0.59.
 const COARSELY_ALIKE: f64 = 0.65;
-/// Side of the squares whose means are left without detail, px; it is doubled until there are few enough.
+/// Side of the squares whose means are left without detail, px; it is doubled until there are at most [`MOST`].
 const DETAIL_PX: usize = 4;
+/// Most squares: a stack of large images is compared in the time of a small one.
+const MOST: usize = 50_000;
 /// Sharpness of a frame far out of focus, relative to one of the scene, in most blocks.
 const DEFOCUSED: f64 = 0.5;
-const FEW: usize = 50_000;
+/// Least sharpness of a block with detail, relative to the sharpest one: others may show noise alone.
+const DETAIL: f64 = 0.1;
 /// Part of the links that correlate less than the usual one: in a stack of four, a bad frame breaks two of three.
 const USUAL: f64 = 2.0 / 3.0;
 /// Usual correlation below which no link tells anything: images without texture, or steps of twice the depth of field.
@@ -251,10 +254,13 @@ struct Link {
 }
 
 impl Neighbours {
+    /// Whether a frame is much less sharp than another in most blocks where that has detail; true if this is not known.
     fn is_less_sharp(&self, frame: usize, other: usize) -> bool {
         let [frame, other] = [frame, other].map(|index| &self.sharpness[index]);
-        let less = frame.iter().zip(other).filter(|(frame, other)| **frame < DEFOCUSED * **other).count();
-        2 * less > frame.len()
+        let least = DETAIL * other.iter().copied().fold(0.0, f64::max);
+        let clear = || frame.iter().zip(other).filter(|(_, other)| **other >= least);
+        let less = clear().filter(|(frame, other)| **frame < DEFOCUSED * **other).count();
+        2 * less >= clear().count()
     }
 }
 
@@ -411,6 +417,7 @@ where
         let runs = ends.array_windows().map(|[from, to]| *from..*to);
         let run = runs.max_by_key(ExactSizeIterator::len).unwrap_or_default();
         let mut warps = vec![None; links.len() + 1];
+        let mut defocused = vec![false; warps.len()];
         let mut warp = Warp::IDENTITY;
         for index in run.clone() {
             if index > run.start {
@@ -431,10 +438,13 @@ where
                     break;
                 }
                 // A moved frame is registered, and a foreign one mostly as sharp as the others.
-                let is_defocused =
-                    link.registered < FOREIGN * registered && neighbours.is_less_sharp(index, other);
-                if is_defocused && self.without_detail(other, index)? >= COARSELY_ALIKE {
-                    warps[index] = Some(placed);
+                let is_defocused = neighbours.is_less_sharp(index, other)
+                    || (defocused[other] && !neighbours.is_less_sharp(other, index));
+                if is_defocused
+                    && link.registered < FOREIGN * registered
+                    && self.without_detail(other, index)? >= COARSELY_ALIKE
+                {
+                    (warps[index], defocused[index]) = (Some(placed), true);
                     break;
                 }
             }
@@ -457,7 +467,7 @@ where
 /// Means of squares of the image, NaN where it does not show the scene.
 fn thinned(image: ArrayView2<f32>) -> Array2<f32> {
     let mut side = DETAIL_PX;
-    while image.len() / (side * side) > FEW {
+    while image.len() / (side * side) > MOST {
         side *= 2;
     }
     let (height, width) = image.dim();

@@ -131,7 +131,7 @@ mod tests {
     use ndarray::array;
 
     use super::*;
-    use crate::context::{Cancel, Progress, Unattended};
+    use crate::context::Heard;
 
     #[test]
     fn maps_of_two_regions_have_no_difference() {
@@ -194,9 +194,8 @@ mod tests {
             (&known, &known, 0, false),
         ] {
             let heard = Heard::default();
-            let context = Context::new(&heard, &Unattended, Cancel::default());
-            difference(first, second, &context).unwrap();
-            let said = heard.0.lock().unwrap();
+            difference(first, second, &heard.context()).unwrap();
+            let said = heard.said();
             let count = |text: &str| said.iter().filter(|said| said.contains(text)).count();
             assert_eq!(
                 (count("taken as mm"), count("in another unit")),
@@ -205,18 +204,9 @@ mod tests {
             );
         }
         let heard = Heard::default();
-        read_two("truth", [&mm, &m], &Context::new(&heard, &Unattended, Cancel::default())).unwrap();
-        let said = heard.0.lock().unwrap().join("\n");
+        read_two("truth", [&mm, &m], &heard.context()).unwrap();
+        let said = heard.said().join("\n");
         assert!(said.contains("first map's depths is 9") && said.contains("of the truth's 0.9"), "{said}");
-    }
-
-    #[derive(Default)]
-    struct Heard(std::sync::Mutex<Vec<String>>);
-
-    impl Progress for Heard {
-        fn info(&self, what: &str) {
-            self.0.lock().unwrap().push(what.into());
-        }
     }
 
     #[test]

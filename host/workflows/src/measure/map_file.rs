@@ -124,12 +124,12 @@ fn is_depth(file: &Path) -> bool {
 pub(super) fn read(path: &Path) -> Result<Measured> {
     let (file, folder, record) = with_record(path)?;
     let map = values_of(&file, record.as_ref())?;
-    let unit = map.unit.unwrap_or_default();
+    let (unit, part) = (map.unit.unwrap_or_default(), map.part);
     let mut remarks = Vec::from_iter(map.taken_as_mm());
     let depth = map.depth(unit, &mut remarks);
     let deviation = deviation_of(&file, &folder, depth.dim())?;
     let lateral = match &record {
-        Some(Record::Depth(record)) => lateral(&record.optics, record.part),
+        Some(Record::Depth(record)) => lateral(&record.optics, part),
         Some(Record::Stack(record)) => match (unit, &record.optics, record.object_pixel_um) {
             (Unit::Mm, Some(optics), _) => lateral(optics, None),
             (Unit::Um, _, Some(side)) => Lateral::Pixel(side),
@@ -194,6 +194,8 @@ fn values_of(file: &Path, record: Option<&Record>) -> Result<MapFile> {
         return Ok(MapFile { file: file.into(), values: depth, nodata: None, unit, part });
     }
     let (values, nodata) = map::read_with_nodata(file)?;
+    // Another map next to it may show the whole images.
+    let part = part.filter(|part| is_depth(file) || part.fits(values.dim()));
     Ok(MapFile { file: file.into(), values, nodata, unit, part })
 }
 
@@ -267,6 +269,10 @@ mod tests {
         let [(depth, lateral), (corrected, same)] = ["depth.npy", "corrected.npy"].map(found);
         assert!(depth.part.is_some() && corrected.part == depth.part, "{:?}", corrected.part);
         assert_eq!(same, lateral);
+        let whole = npy::write(Array2::from_elem((9, 9), 900.0).view());
+        fs::write(folder.path().join("truth.npy"), whole).expect("a writable folder");
+        let (truth, centred) = found("truth.npy");
+        assert!(truth.part.is_none() && centred != lateral);
         assert_eq!((depth.unit, corrected.unit), (Some(Unit::Mm), None));
     }
 

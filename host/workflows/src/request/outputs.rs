@@ -5,14 +5,11 @@ use std::{
     path::{Component, Path, PathBuf},
 };
 
-use farnear_files::staging::Staging;
+use farnear_files::{staging::Staging, video::pictures};
 use serde_json::Value;
 
 use super::{PathKind, Request};
 use crate::error::{Result, WorkflowError};
-
-/// Endings of files that a folder with inputs holds.
-const PICTURES: [&str; 8] = ["png", "tif", "tiff", "jpg", "jpeg", "pgm", "bmp", "npy"];
 
 /// Checks a request before its work. No field may contradict another, no result may be inside another, because each
 /// appears when it is complete, and no file may replace an input.
@@ -41,7 +38,7 @@ pub fn check<R: Request>(request: &R) -> Result<()> {
     Ok(())
 }
 
-/// Checks before the work that each result file can be written after it. Not for batch, which makes folders itself.
+/// Checks before the work of a command that each result file can be written after it. Batch makes folders itself.
 pub fn check_folders<R: Request>(request: &R) -> Result<()> {
     files(&outputs(request)).try_for_each(|(name, path)| check_folder(name, path))
 }
@@ -52,7 +49,10 @@ pub(crate) fn check_folder(name: &'static str, path: &Path) -> Result<()> {
     let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
     let folder = parent.unwrap_or(Path::new("."));
     if !folder.is_dir() {
-        return unusable(format!("there is no folder {}: make it, or name another place", folder.display()));
+        return unusable(format!(
+            "the folder {} does not exist: create it, or name another place",
+            folder.display()
+        ));
     }
     if path.is_dir() {
         return unusable("it is a folder: name a file".into());
@@ -86,7 +86,7 @@ fn replaces(current: &Path, output: &Path, input: &Path) -> bool {
     let [output, input] = [output, input].map(|path| on_disk(current, path));
     let is_picture = |path: &Path| {
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
-        PICTURES.iter().any(|picture| ending == *picture)
+        pictures::EXTENSIONS.iter().chain(&["npy"]).any(|picture| ending == *picture)
     };
     output == input
         || (output.starts_with(&input) && input.is_dir() && output.is_file() && is_picture(&output))
@@ -188,8 +188,8 @@ mod tests {
         std::fs::write(place("file"), "").expect("a writable folder");
         let sample = |plot: Option<PathBuf>| Sample { plot, ..Sample::default() };
         for (plot, phrase) in [
-            ("nodir/x.svg", "nodir: make it, or name another place"),
-            ("file/x.svg", "there is no folder"),
+            ("nodir/x.svg", "nodir does not exist: create it, or name another place"),
+            ("file/x.svg", "file does not exist"),
             ("taken", "it is a folder: name a file"),
         ] {
             let error = check_folders(&sample(Some(place(plot)))).expect_err("refused");

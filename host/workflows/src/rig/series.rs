@@ -87,20 +87,8 @@ fn wait(due: Instant, context: &Context<'_>) -> Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Mutex;
-
     use super::*;
-    use crate::context::Progress;
-
-    #[derive(Default)]
-    struct Counted(Mutex<Vec<(usize, Option<usize>)>>);
-
-    impl Progress for Counted {
-        fn info(&self, _: &str) {}
-        fn advance(&self, _: &'static str, done: usize, total: Option<usize>) {
-            self.0.lock().unwrap().push((done, total));
-        }
-    }
+    use crate::context::Counted;
 
     #[test]
     fn the_seconds_of_a_wait_are_counted() {

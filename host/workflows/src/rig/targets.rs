@@ -240,7 +240,8 @@ fn distances(asked_mm: &[f64], optics: &Optics) -> Result<Vec<f64>> {
     let usable = |mm: f64| mm.is_finite() && optics.alpha(mm).abs() <= LARGEST_ALPHA;
     if let Some(bad) = asked_mm.iter().find(|mm| !usable(**mm)) {
         let [nearest, farthest] = [LARGEST_ALPHA, -LARGEST_ALPHA].map(|alpha| optics.depth_mm(alpha));
-        let expected = format!("expected {nearest:.1} to {farthest:.1} mm, the range of the optics");
+        let [nearest, farthest] = [(10.0 * nearest).ceil() / 10.0, (10.0 * farthest).floor() / 10.0];
+        let expected = format!("expected {nearest} to {farthest} mm, the range of the optics");
         return Err(WorkflowError::parameter("distances", bad, expected));
     }
     if !asked_mm.is_empty() {
@@ -289,7 +290,7 @@ mod tests {
             let error = distances(&[900.0, wrong], &optics).unwrap_err();
             assert!(error.is_usage());
             let error = error.to_string();
-            assert!(error.starts_with(&format!("distances {wrong}: expected 884.6 to 935.4 mm")), "{error}");
+            assert!(error.starts_with(&format!("distances {wrong}: expected 884.7 to 935.4 mm")), "{error}");
         }
     }
 

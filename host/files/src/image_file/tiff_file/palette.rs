@@ -19,13 +19,26 @@ pub(super) fn is_read(page: &Directory) -> bool {
         && page.colour_map.len() == 3 << page.bits
 }
 
-/// Pages with a palette for display only become grey.
+/// Pages with a palette for display only become grey: one of ImageJ whose colours change gradually. Colours of a picture
+/// (8-bit Color) leap.
 pub(super) fn without_display(pages: &mut [Directory]) {
     let described = pages.first().and_then(|first| first.description.as_deref());
     if described.is_some_and(tiff_tags::is_image_j) {
-        let pages = pages.iter_mut().filter(|page| page.photometric == u64::from(PALETTE));
-        pages.for_each(|page| page.photometric = u64::from(GREY));
+        let is_palette = |page: &&mut Directory| page.photometric == u64::from(PALETTE) && is_gradual(page);
+        pages.iter_mut().filter(is_palette).for_each(|page| page.photometric = u64::from(GREY));
     }
+}
+
+fn is_gradual(page: &Directory) -> bool {
+    /// Largest step of a channel, of 65535: that of 16 levels.
+    const LARGEST: u64 = 65535 / 15;
+    let colours = (page.colour_map.len() / 3).max(1);
+    let mut channels = page.colour_map.chunks(colours);
+    // The ends may mark saturated pixels (HiLo).
+    channels.all(|channel| {
+        let inner = channel.get(1..channel.len() - 1).unwrap_or_default();
+        inner.array_windows().all(|[a, b]| a.abs_diff(*b) <= LARGEST)
+    })
 }
 
 /// A file whose palette page reads as grey.

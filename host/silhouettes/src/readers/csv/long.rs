@@ -8,7 +8,10 @@ use csv::StringRecord;
 
 use super::{TIMES, check_width, coordinate, line};
 use crate::readers::{
-    keypoints::table::{CONFIDENCES, FRAMES, PEOPLE, are_keypoints},
+    keypoints::{
+        names,
+        table::{CONFIDENCES, FRAMES, PEOPLE, are_keypoints},
+    },
     recording::{RecordingError, number},
 };
 
@@ -193,6 +196,8 @@ fn grouped<'a>(
     let value = |group: &Group<'_>| number(&group.frame).filter(|value| value.is_finite());
     if groups.iter().all(|group| value(group).is_some()) {
         groups.sort_by(|a, b| value(a).partial_cmp(&value(b)).unwrap_or(Ordering::Equal));
+    } else {
+        groups.sort_by_cached_key(|group| names::split(&group.frame));
     }
     if columns.frame.is_none() {
         let mut known: HashMap<String, usize> = HashMap::new();
@@ -339,8 +344,15 @@ mod tests {
         melted.sort_by_key(|row| row.split(',').nth(1).map(str::to_owned));
         // The first frame lacks the first point.
         melted.remove(0);
-        for column in ["frame", "time"] {
-            let found = read(&format!("{column},marker,x,y,z"), &melted, None).expect("markers");
+        let named: Vec<String> = melted
+            .iter()
+            .map(|row| match row.strip_prefix("0.5,") {
+                Some(rest) => format!("img_10,{rest}"),
+                None => format!("img_9,{}", &row[2..]),
+            })
+            .collect();
+        for (column, rows) in [("frame", &melted), ("time", &melted), ("frame", &named)] {
+            let found = read(&format!("{column},marker,x,y,z"), rows, None).expect("markers");
             let nose = [0, 1].map(|frame| found.by_name(frame)["nose"][0]);
             assert!(!found.by_name(0).contains_key("left_ankle"));
             assert_eq!(nose, [1000.0, 1100.0], "{column}");

@@ -52,11 +52,17 @@ pub fn read(
     if bodies(&points).is_empty() {
         numbers = numbers_of(&points).unwrap_or_default();
         // Next to the points of a person these are the x1, y1, x2 and y2 of a box.
-        if numbers.is_empty()
-            && let Ok((others, has_depth)) = points_of(columns, numbered)
-            && let Some(found) = numbers_of(&others)
-        {
-            (points, has_z, numbers) = (others, has_depth, found);
+        if numbers.is_empty() {
+            match points_of(columns, numbered) {
+                Ok((others, has_depth)) => {
+                    if let Some(found) = numbers_of(&others) {
+                        (points, has_z, numbers) = (others, has_depth, found);
+                    }
+                }
+                Err(error) if points.is_empty() => return Err(error),
+                // They may be of another kind.
+                Err(_) => {}
+            }
         }
     }
     if points.is_empty() {

@@ -161,6 +161,8 @@ fn a_last_frame_far_out_of_focus_is_kept_unless_it_is_foreign() {
     let mut images: Vec<Array2<f32>> =
         [5, 3, 1, 3, 5, 9, 15].iter().enumerate().map(|(number, side)| image(&own, number, *side)).collect();
     assert_eq!(left_out(&images, None), [0; 0]);
+    let longer: Vec<_> = images.iter().cloned().chain([7, 8].map(|number| image(&own, number, 15))).collect();
+    assert_eq!(left_out(&longer, None), [0; 0]);
     images[6] = image(&texture(21), 6, 15);
     assert_eq!(left_out(&images, None), [6]);
     // In the round field of a microscope, whose outline all images share.
