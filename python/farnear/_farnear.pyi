@@ -775,9 +775,9 @@ def calibrate_stack(
     images : sequence of array (height, width)
         Slices of one size and one kind, one stage step apart, the one with the farthest focus first.
     step_mm : float
-        Distance between neighbouring slices, mm, or in any unit of the stage; all depths are in that unit then.
+        Distance between neighbouring slices, mm (0.5 um is 0.0005). Steps in degrees, dioptres or volts give depths in that unit.
     object_pixel_um : float, optional
-        Side of a pixel at the target, in thousandths of the unit of the steps; without it point clouds have any scale.
+        Side of a pixel at the target, um; without it point clouds have any scale.
     far_mm : float, optional
         Distance of the far-focused plane of a pair, mm; without it depth is relative.
     pair_step : int, optional

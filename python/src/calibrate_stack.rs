@@ -3,7 +3,7 @@
 use std::sync::atomic::Ordering;
 
 use farnear_depth::calibrate::stack::{self, Moved, StackSettings};
-use farnear_workflows::calibrate::stack::verdict;
+use farnear_workflows::{calibrate::stack::verdict, figures::rounded_for};
 use ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::prelude::*;
@@ -105,8 +105,10 @@ impl StackFit {
 
     fn __repr__(&self) -> String {
         format!(
-            "StackFit(pairs {} slices apart, {:.4} mm RMS, {})",
-            self.pair_step, self.rms_mm, self.verdict
+            "StackFit(pairs {} slices apart, {} mm RMS, {})",
+            self.pair_step,
+            rounded_for(self.rms_mm, self.rms_mm, 4),
+            self.verdict
         )
     }
 }
@@ -118,9 +120,9 @@ impl StackFit {
 /// images : sequence of array (height, width)
 ///     Slices of one size and one kind, one stage step apart, the one with the farthest focus first.
 /// step_mm : float
-///     Distance between neighbouring slices, mm, or in any unit of the stage; all depths are in that unit then.
+///     Distance between neighbouring slices, mm (0.5 um is 0.0005). Steps in degrees, dioptres or volts give depths in that unit.
 /// object_pixel_um : float, optional
-///     Side of a pixel at the target, in thousandths of the unit of the steps; without it point clouds have any scale.
+///     Side of a pixel at the target, um; without it point clouds have any scale.
 /// far_mm : float, optional
 ///     Distance of the far-focused plane of a pair, mm; without it depth is relative.
 /// pair_step : int, optional

@@ -7,6 +7,7 @@ use farnear_files::{image_file, map, mesh::Lateral, npy, view::view_png};
 use farnear_workflows::{
     MADE_BY,
     depth::part::Part,
+    figures::rounded_for,
     measure::{self, Rectangle},
     result_folder,
 };
@@ -388,6 +389,7 @@ impl Plane {
     }
 
     fn __repr__(&self) -> String {
-        format!("Plane({:.3} mm, tilt {:.3} deg, rms {:.3} mm)", self.z_mm, self.tilt_deg, self.rms_mm)
+        let [z_mm, rms_mm] = [self.z_mm, self.rms_mm].map(|mm| rounded_for(self.rms_mm, mm, 3));
+        format!("Plane({z_mm} mm, tilt {:.3} deg, rms {rms_mm} mm)", self.tilt_deg)
     }
 }

@@ -283,6 +283,9 @@ def test_a_lens_is_calibrated_from_a_stack_and_measures_its_pairs():
     # Without the size of a pixel at the target only depth is in mm.
     plane = found.plane()
     assert np.isnan(plane.tilt_deg) and abs(plane.slope_x) < 0.01
+    # As of a microscope.
+    flat = farnear.Plane._assemble(4.586184, 0.0, 0.0, 0.0, 2.936e-6, 1.4e-5)
+    assert repr(flat) == "Plane(4.586184 mm, tilt 0.000 deg, rms 0.00000294 mm)", flat
     with pytest.raises(farnear.FarnearError, match="object-pixel-um"):
         farnear.points_mm(found.depth_mm, fit.optics)
     with pytest.raises(farnear.FarnearError, match="2 slices"):

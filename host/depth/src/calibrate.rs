@@ -97,8 +97,8 @@ pub enum CalibrationError {
     #[error("no pair to calibrate on")]
     NoPair,
     #[error(
-        "the optics have a response that calibrate stack learned for their own point spread function: give the optics file of the \
-         camera"
+        "calibrate stack has already found the point spread function of this lens and a response for it: measure with this file, or give \
+         an optics file without [stage] to find another"
     )]
     LearnedLens,
     #[error(

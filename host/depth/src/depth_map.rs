@@ -83,13 +83,32 @@ impl fmt::Display for Warning {
             Self::LooksSwapped(evidence) => {
                 write!(f, "the pair looks swapped: ")?;
                 match evidence {
-                    SwapEvidence::LowerPartFarther { difference_mm } => write!(
-                        f,
-                        "the lower part of the scene would lie {difference_mm:.0} mm farther away than the upper part"
-                    )?,
+                    SwapEvidence::LowerPartFarther { difference_mm } => {
+                        // Two digits: a microscope's range is a fraction of a mm.
+                        let decimals = (1.0 - difference_mm.abs().log10().floor()).clamp(0.0, 6.0) as usize;
+                        write!(
+                            f,
+                            "the lower part of the scene would lie {difference_mm:.decimals$} mm farther away than the upper part"
+                        )?;
+                    }
                 }
                 write!(f, "; is FAR really the far-focused image?")
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_and_large_distances_have_two_digits() {
+        for (difference_mm, digits) in
+            [(412.3, "lie 412 mm"), (46.2, "lie 46 mm"), (0.332, "lie 0.33 mm"), (0.000_61, "lie 0.00061 mm")]
+        {
+            let text = Warning::LooksSwapped(SwapEvidence::LowerPartFarther { difference_mm }).to_string();
+            assert!(text.contains(digits), "{text}");
         }
     }
 }

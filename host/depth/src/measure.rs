@@ -3,7 +3,7 @@
 mod finding;
 mod scaled_blur;
 
-use ndarray::{Array2, ArrayView2, Zip};
+use ndarray::{Array2, ArrayView2, Zip, s};
 
 use crate::adaptive_window::{
     Bank, Estimate, Window, WindowSettings, check_pair, estimate, estimate_without_depth,
@@ -30,6 +30,8 @@ use scaled_blur::undo_scaled_blur;
 const OUT_OF_RANGE_ALPHA: f64 = 1.2;
 /// Least part of the estimated noise that the residual may leave.
 const LEAST_NOISE: f64 = 0.1;
+/// Rows in the middle of a learned lens's images whose residual is compared with the noise first.
+const SAMPLED_ROWS: usize = 96;
 /// Part of the pixels lost for one reason above which it is reported.
 pub const LEAST_REPORTED: f64 = 0.01;
 /// Part of the noise by lossy compression that is worth a word: JPEG of quality 95 has 0.3, 90 has 0.4.
@@ -183,15 +185,20 @@ pub(crate) fn measure_after(
         return Err(MeasureError::LearnedForWhitened);
     }
     let mut prepare = settings.prepare;
-    let images = match optics.stage() {
-        Some(stage) => {
-            // A learned response compares the residual with its own usual one instead.
-            prepare.trust = true;
-            prepare.coding /= (stage.bin * stage.bin) as f64;
-            images.map(|image| binned(image, stage.bin))
+    let (mut images, mut camera) = (images, camera);
+    if let Some(stage) = optics.stage() {
+        // A learned response compares the residual with its own usual one instead.
+        prepare.trust = true;
+        prepare.coding /= (stage.bin * stage.bin) as f64;
+        // The frames are of single pixels.
+        if let Some(frames) = camera.take_if(|_| stage.bin > 1) {
+            let white = prepare.limits.map_or(f32::INFINITY, |[_, white]| white);
+            for image in &mut images {
+                *image = frames.correct_below(image.view(), white).map_err(PrepareError::from)?;
+            }
         }
-        None => images,
-    };
+        images = images.map(|image| binned(image, stage.bin));
+    }
     check_pair(images[0].view(), images[1].view())?;
     let is_mosaic = is_mosaic(images[0].view());
     let prepared = prepare_after(last, images, optics, camera, &prepare)?;
@@ -228,12 +235,25 @@ pub(crate) fn measure(
     settings: &MeasureSettings,
 ) -> Result<(DepthMap, Estimate), MeasureError> {
     let (far, near) = (prepared.far.view(), prepared.near.view());
-    let of_windows = WindowSettings {
+    let mut of_windows = WindowSettings {
         window: settings.window,
         median_px: settings.run.median_px,
         noise: prepared.noise,
         backend: settings.run.backend,
     };
+    // Part of the pair's noise that the estimate is given.
+    let mut of_noise = 1.0;
+    if optics.stage().is_some() {
+        // With too much noise the choice of windows would smooth relief away.
+        let middle = far.nrows().saturating_sub(SAMPLED_ROWS) / 2;
+        let rows = middle..(middle + SAMPLED_ROWS).min(far.nrows());
+        let [far, near] = [far, near].map(|image| image.slice_move(s![rows.clone(), ..]));
+        // The middle may be blank.
+        if let Ok(sample) = estimate_without_depth(far, near, white, optics, &of_windows) {
+            of_noise = of_residual(sample.excess);
+            of_windows.noise = of_windows.noise.scaled(of_noise);
+        }
+    }
     let run = |side: usize| Settings { smoothing_px: side, ..settings.run };
     // The map first: validity needs no depth of its own, and maps are large.
     let (map, mut judging) = match (method, settings.window) {
@@ -261,13 +281,12 @@ pub(crate) fn measure(
         DepthMethod::Rational(_) => RATIONAL_OVER_WHITENED,
         DepthMethod::Baseline(_) => BASELINE_OVER_WHITENED,
     };
-    // The noise of the pair contains what fine texture the blur leaves; the residual of the right depth does not.
-    let noise = if judging.excess < 1.0 { judging.excess.max(LEAST_NOISE) as f32 } else { 1.0 };
+    let noise = (of_residual(judging.excess * of_noise) / of_noise) as f32;
     let of_deviation = noisier * noise.sqrt();
     if of_deviation != 1.0 {
         judging.deviation_mm.par_mapv_inplace(|deviation| deviation * of_deviation);
     }
-    if noise < 1.0 {
+    if noise != 1.0 {
         judging.misfit.par_mapv_inplace(|misfit| misfit / noise);
     }
     // The border has the depth, so also the deviation and misfit, of the pixels next to it.
@@ -293,6 +312,12 @@ pub(crate) fn measure(
         respond([&mut map.depth_mm, &mut estimate.deviation_mm], prepared, stage, optics);
     }
     Ok((map, estimate))
+}
+
+/// Part of the noise of a pair that its residual shows. That noise contains what fine texture the blur leaves; the residual of the
+/// right depth does not.
+fn of_residual(excess: f64) -> f64 {
+    if excess < 1.0 { excess.max(LEAST_NOISE) } else { 1.0 }
 }
 
 /// Applies the stage's response and scales the deviation; unlearned depths move out of the valid range.
@@ -323,7 +348,7 @@ pub fn binned(image: Array2<f32>, bin: usize) -> Array2<f32> {
     let (height, width) = image.dim();
     let area = (bin * bin) as f32;
     Array2::from_shape_fn((height / bin, width / bin), |(y, x)| {
-        image.slice(ndarray::s![y * bin..(y + 1) * bin, x * bin..(x + 1) * bin]).sum() / area
+        image.slice(s![y * bin..(y + 1) * bin, x * bin..(x + 1) * bin]).sum() / area
     })
 }
 

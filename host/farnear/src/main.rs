@@ -16,12 +16,13 @@ mod terminal;
 mod tips;
 
 use std::{
+    ffi::OsString,
     io::{self, Write},
     process::ExitCode,
 };
 
 use clap::{
-    CommandFactory, Parser, Subcommand,
+    Arg, CommandFactory, FromArgMatches, Parser, Subcommand,
     error::{ContextKind, ContextValue},
 };
 use farnear_workflows::{
@@ -157,7 +158,7 @@ fn execute(command: Command) -> anyhow::Result<()> {
 
 /// Parses the command line; some errors get a tip. `None` if it asks for help or the version, which is printed.
 fn parse() -> anyhow::Result<Option<Command>> {
-    let mut error = match Arguments::try_parse() {
+    let mut error = match parsed(std::env::args_os()) {
         Ok(arguments) => return Ok(Some(arguments.command)),
         Err(error) => error,
     };
@@ -171,6 +172,21 @@ fn parse() -> anyhow::Result<Option<Command>> {
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
     }
     error.exit()
+}
+
+fn parsed(words: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> Result<Arguments, clap::Error> {
+    let mut command = with_negative_numbers(Arguments::command());
+    let mut matches = command.try_get_matches_from_mut(words)?;
+    Arguments::from_arg_matches_mut(&mut matches).map_err(|error| error.format(&mut command))
+}
+
+/// A negative number after an option is its value, so that the option itself refuses it.
+fn with_negative_numbers(command: clap::Command) -> clap::Command {
+    let allowing = |option: Arg| {
+        let has_value = option.get_long().is_some() && option.get_action().takes_values();
+        if has_value { option.allow_negative_numbers(true) } else { option }
+    };
+    command.mut_args(allowing).mut_subcommands(with_negative_numbers)
 }
 
 /// An error and its causes in one line, without causes that the error's message already contains.
@@ -195,6 +211,17 @@ mod tests {
 
     /// Options of the command line only.
     const ONLY_HERE: [&str; 3] = ["json", "help", "version"];
+
+    #[test]
+    fn a_negative_number_is_the_value_of_the_option_before_it() {
+        for words in [
+            ["calibrate", "stack", "slices", "--out", "lens.toml", "--step-mm", "-0.083"],
+            ["depth", "far.png", "near.png", "--optics", "optics.toml", "--min-confidence", "-1"],
+        ] {
+            let error = parsed(["farnear"].into_iter().chain(words)).err().map(|error| error.to_string());
+            assert_eq!(error, None);
+        }
+    }
 
     #[test]
     fn a_cause_that_the_message_contains_is_not_repeated() {

@@ -19,6 +19,7 @@ use crate::{
     image_file::{self, Decoded, GreyImage, ImageError, Pages, ReadSettings},
     video::VideoError,
 };
+pub use names::positions_in_names;
 
 #[derive(Debug, Clone, Default)]
 pub struct Stack {

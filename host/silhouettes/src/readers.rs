@@ -42,11 +42,21 @@ pub const READERS: [Reader; 8] = [
     trc::READER,
 ];
 
+/// Widespread formats that are not read, and what to do.
+const EXPORTS: [(&[&str], &str); 2] = [
+    (&["h5", "hdf5", "slp", "parquet", "xlsx"], "; export the table as .csv"),
+    (&["fbx", "mvnx", "amc", "asf", "glb", "mot", "qtm"], "; export the motion as .bvh, .c3d, .trc or .csv"),
+];
+
 /// Reads by file extension (any case, no dot). `choices` overrides the file; guesses are in [`Recording::remarks`].
 pub fn read(bytes: &[u8], extension: &str, choices: Choices) -> Result<Recording, RecordingError> {
     let ending = extension.to_lowercase();
     let reader = READERS.iter().find(|reader| reader.extensions.contains(&ending.as_str()));
-    let reader = reader.ok_or_else(|| RecordingError::Extension { found: ending, known: extensions() })?;
+    let reader = reader.ok_or_else(|| {
+        let export = EXPORTS.iter().find(|(endings, _)| endings.contains(&ending.as_str()));
+        let advice = export.map_or("", |(_, advice)| advice);
+        RecordingError::Extension { known: format!("{}{advice}", extensions()), found: ending }
+    })?;
     settled((reader.read)(bytes, choices)?, choices)
 }
 
@@ -86,6 +96,10 @@ mod tests {
         }
         let error = read(b"", "PNG", Choices::default()).expect_err("no reader");
         assert!(error.to_string().contains("`.png`") && error.to_string().contains(".bvh, .c3d"), "{error}");
+        for (ending, advice) in [("h5", "export the table as .csv"), ("mvnx", "export the motion as .bvh")] {
+            let error = read(b"", ending, Choices::default()).expect_err("no reader").to_string();
+            assert!(error.contains(advice), "{error}");
+        }
         assert!(read(b"", "TRC", Choices::default()).is_err());
     }
 }

@@ -299,7 +299,8 @@ fn separation(
                 [one] => format!("{name} = {one}{or}"),
                 [least, .., most] => format!("{name} = {least} to {most}{or}"),
                 [] if per_slice > 1.0 => "a finer step of the stage".into(),
-                [] => "a coarser step of the stage or more slices".into(),
+                [] => "a coarser step of the stage, more slices, or a target with finer, irregular texture"
+                    .into(),
             };
             StackError::NoSeparation { per_slice, given: given.into_iter().flatten().collect(), hint }
         })
@@ -383,11 +384,11 @@ mod tests {
             // More slices apart than are tried, and more pixels.
             (0.1, StackSettings { pair_step: Some(6), ..usual.clone() }, "use pair_step = 16 to 19"),
             (40.0, StackSettings { bin: Some(1), ..usual.clone() }, "use bin = 12 to 16"),
-            (0.01, usual.clone(), "use a coarser step of the stage or more slices"),
+            (0.01, usual.clone(), "more slices, or a target with finer, irregular texture"),
             (
                 0.01,
                 StackSettings { bin: Some(1), ..usual.clone() },
-                "use a coarser step of the stage or more slices",
+                "use a coarser step of the stage, more slices, or a target with finer, irregular texture",
             ),
             (99.0, usual.clone(), "use a finer step of the stage"),
         ] {

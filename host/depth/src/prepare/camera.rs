@@ -233,6 +233,17 @@ impl CameraFrames {
         Ok(mended)
     }
 
+    /// [`correct`](Self::correct) of an image that is clipped at `white`: clipped pixels remain there, and others get at most
+    /// `white`.
+    pub fn correct_below(&self, image: ArrayView2<f32>, white: f32) -> Result<Array2<f32>, CameraError> {
+        let mut seen = self.correct(image)?;
+        Zip::from(&mut seen).and(&image).and(&self.bad).for_each(|seen, value, bad| {
+            let is_known = *value < white || *bad && value.is_finite();
+            *seen = if is_known { seen.min(white) } else { *value };
+        });
+        Ok(seen)
+    }
+
     /// Whether an image was taken as the frames were.
     pub(super) fn check(&self, image: ArrayView2<f32>) -> Result<(), CameraError> {
         self.check_size(image.dim())?;

@@ -61,6 +61,15 @@ impl PairNoise {
         }
     }
 
+    /// Noise of `factor` times the variance.
+    #[must_use]
+    pub(crate) fn scaled(self, factor: f64) -> Self {
+        let [constant, per_unit, mean_variance, coding, added] =
+            [self.constant, self.per_unit, self.mean_variance, self.coding, self.added]
+                .map(|part| part * factor);
+        Self { constant, per_unit, mean_variance, coding, added }
+    }
+
     /// Variance at a brightness.
     pub fn variance(&self, brightness: f64) -> f64 {
         (self.constant + self.per_unit * brightness).max(0.1 * self.mean_variance).max(f64::MIN_POSITIVE)

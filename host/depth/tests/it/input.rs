@@ -5,8 +5,9 @@
 use crate::common::{Texture, eight_bit, rig};
 use farnear_depth::measure::{DepthMethod, MeasureError, MeasureSettings, measure_pair};
 use farnear_depth::operators::{Operators, Request, design};
-use farnear_depth::optics::Optics;
+use farnear_depth::optics::{Optics, Stage};
 use farnear_depth::pipeline::{DepthMap, RunError, Settings, Warning, depth_from_pair};
+use farnear_depth::prepare::CameraFrames;
 use ndarray::{Array2, s};
 
 const ALPHA: f64 = 0.4;
@@ -178,4 +179,31 @@ fn a_textureless_disc_is_filled_from_its_surroundings() {
         assert!(rmse < 0.25, "noisy {noisy}: {rmse}");
         assert!(map.confidence.slice(s![65..95, 65..95]).iter().all(|c| *c > 0.0 && *c < 0.5));
     }
+}
+
+#[test]
+fn a_learned_lens_averages_pixels_of_a_corrected_camera() {
+    let Bench { optics, pair, .. } = Bench::new(96);
+    let lens = optics.with_stage(Stage::identity(2, 1));
+    let fine = |image: &Array2<f32>| Array2::from_shape_fn((192, 192), |(y, x)| 0.5 * image[(y / 2, x / 2)]);
+    let response = Array2::from_shape_fn((192, 192), |(y, x)| 1.0 + ((y * 131 + x * 71) % 17) as f32 / 160.0);
+    let hot = Array2::from_shape_fn((192, 192), |at| at == (90, 101));
+    let frames = CameraFrames::new(Array2::zeros((192, 192)), response.clone(), hot.clone()).unwrap();
+    let depth = |images: [Array2<f32>; 2], camera: Option<&CameraFrames>| {
+        let mut settings = MeasureSettings::default();
+        settings.prepare.limits = Some([0.0, 1.0]);
+        measure_pair(images, &lens, DepthMethod::Whitened, camera, &settings).unwrap().map.depth_mm
+    };
+    let even = depth(pair.each_ref().map(fine), None);
+    let recorded = |image: &Array2<f32>| {
+        let mut seen = fine(image) * &response;
+        seen.zip_mut_with(&hot, |value, hot| *value = if *hot { 1.0 } else { *value });
+        seen
+    };
+    let corrected = depth(pair.each_ref().map(recorded), Some(&frames));
+    assert_eq!(corrected.dim(), (96, 96));
+    let apart = (&corrected - &even).fold(0.0_f32, |most, apart| most.max(apart.abs()));
+    assert!(apart < 0.1, "{apart} mm");
+    assert!(even.iter().filter(|depth| depth.is_finite()).count() > 8000);
+    assert!(even.iter().zip(&corrected).all(|(a, b)| a.is_finite() == b.is_finite()));
 }

@@ -123,6 +123,6 @@ fn a_place_that_cannot_be_written_is_named() {
         );
     }
     let operators = ["operators", "--optics", rig_optics(), "--out", &below];
-    fails(&mut farnear(&operators), 2, &["below", "the folder", "does not exist"]);
+    fails(&mut farnear(&operators), 2, &["below", "file is not a folder"]);
     assert_eq!(folder.listing(), before);
 }

@@ -145,5 +145,8 @@ fn the_pages_of_a_tiff_tell_their_step_and_give_the_same_lens() {
     assert_eq!(read(&lens), read(&other));
     assert!(read(&plot).contains("Held-out errors"));
     let without = ["calibrate", "stack", &target, "--out", &other];
-    fails(&mut farnear(&without), 2, &["step-mm", "these files do not tell it"]);
+    fails(&mut farnear(&without), 2, &["step-mm", "neither metadata nor names"]);
+    let below = ["calibrate", "stack", &target, "--step-mm", "-0.1", "--out", &other];
+    let error = fails(&mut farnear(&below), 2, &["step-mm -0.1: expected a positive number", "--near-first"]);
+    assert!(!error.contains("calibrating"), "{error}");
 }

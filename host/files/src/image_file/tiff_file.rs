@@ -44,7 +44,7 @@ pub(crate) struct Pages {
 }
 
 impl Pages {
-    /// `None` for other formats and those that [`super::decode`] refuses. Fails for raw files and mere previews.
+    /// `None` for other formats and those that [`super::decode()`] refuses. Fails for raw files and mere previews.
     pub fn open(path: &Path) -> Result<Option<Self>, ImageError> {
         let failed = |source| ImageError::Read { path: path.into(), source };
         let file = InFile::open(path).map_err(failed)?;

@@ -8,7 +8,7 @@ use std::{
 use super::positions::unit_um;
 use crate::order::{
     self,
-    name::{Name, Number},
+    name::{Name, Number, last_varying},
 };
 
 /// Largest share of images outside the pattern of the others, relative to these, that is left out and not refused.
@@ -117,6 +117,15 @@ impl Series {
     pub fn would_hold(&self, path: &std::path::Path) -> bool {
         self.pattern.as_ref().is_none_or(|pattern| Name::of(path).texts == *pattern)
     }
+}
+
+/// Positions, um, if a unit (nm, um or mm) follows the number that counts the images: `z-83um.tif`.
+pub fn positions_in_names(images: &[PathBuf]) -> Option<Vec<f64>> {
+    let names: Vec<Name> = images.iter().map(|path| Name::of(path)).collect();
+    let after = &names.first()?.texts[last_varying(&names)? + 1];
+    let unit = after.split(|c: char| !c.is_alphabetic()).find(|word| !word.is_empty())?;
+    let um = unit_um(unit).filter(|um| [1e-3, 1.0, 1e3].contains(um))?;
+    order::numbers(images).into_iter().map(|number| Some(number? * um)).collect()
 }
 
 fn file(path: &std::path::Path) -> String {
@@ -339,6 +348,23 @@ mod tests {
             of(&|z| format!("{z}{}.png", if z < 3 { "um" } else { "\u{b5}m" })),
         ] {
             one.unwrap();
+        }
+    }
+
+    #[test]
+    fn positions_in_names_have_a_unit_after_the_number_that_counts() {
+        let of = |names: &[&str]| positions_in_names(&Vec::from_iter(names.iter().map(PathBuf::from)));
+        for (names, positions) in [
+            (["z-83um.tif", "z0um.tif", "z83um.tif"], [-83.0, 0.0, 83.0]),
+            (["1 mm.png", "1.5 mm.png", "2 mm.png"], [1000.0, 1500.0, 2000.0]),
+            (["a_250nm_x.png", "a_500nm_x.png", "a_750nm_x.png"], [0.25, 0.5, 0.75]),
+            (["z1\u{b5}m.png", "z2\u{b5}m.png", "z3\u{b5}m.png"], [1.0, 2.0, 3.0]),
+        ] {
+            let found = of(&names).unwrap();
+            assert!(found.iter().zip(positions).all(|(a, b)| (a - b).abs() < 1e-9), "{found:?}");
+        }
+        for names in [["1.png", "2.png"], ["1_50um.png", "2_50um.png"], ["1s.png", "2s.png"]] {
+            assert_eq!(of(&names), None);
         }
     }
 

@@ -1,10 +1,13 @@
 //! CSV markers: header `frame,NAME_x,NAME_y,NAME_z,...` (or `NAME:x`, `NAME.X`), a frame per row, mm, empty = hidden; with
-//! `NAMEX,NAMEY,NAMEZ` as the Kinect SDK names joints (metres, y up); with names above the axes, as Vicon Nexus and OptiTrack
-//! Motive export them; or with a row for each point.
+//! `NAMEX,NAMEY,NAMEZ` as the Kinect SDK names joints (metres, y up); with names above the axes, as Vicon Nexus, OptiTrack
+//! Motive and pandas write them; with a row for each point or value; or of Qualisys Track Manager.
 
+pub(super) mod columns;
 mod long;
+mod melted;
+mod qualisys;
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use csv::StringRecord;
 
@@ -14,12 +17,12 @@ use super::recording::{
     Choices, Found, Known, RecordingError, Source, Unit, Up, check_last_row, number, promised_frames, text,
 };
 use super::trc::point;
-use crate::silhouette::capsule::Point3;
+use crate::silhouette::{anatomy, capsule::Point3};
 
 pub const READER: Reader = Reader {
     name: "CSV",
-    extensions: &["csv"],
-    about: "a table with columns NAME_x, NAME_y, NAME_z in millimetres, z up, or of the Kinect SDK, Vicon Nexus or OptiTrack Motive; keypoints with NAME_x and NAME_y, with a row for each, or of SLEAP, DeepLabCut or MocapNET",
+    extensions: &["csv", "tsv"],
+    about: "a table with columns NAME_x, NAME_y, NAME_z in millimetres, z up, or of the Kinect SDK, Vicon Nexus, OptiTrack Motive or Qualisys Track Manager; keypoints with NAME_x and NAME_y, with a row for each, or of SLEAP, DeepLabCut or MocapNET",
     read,
 };
 
@@ -27,10 +30,8 @@ pub const READER: Reader = Reader {
 const MOTIVE_FRAMES: &str = "Total Exported Frames";
 /// Some joints under the Kinect SDK's names.
 const KINECT: [&str; 4] = ["ShoulderLeft", "WristRight", "KneeLeft", "AnkleRight"];
-/// Columns of times.
-const TIMES: [&str; 4] = ["time", "t", "time (s)", "timestamp"];
-/// Times further apart than this are milliseconds, others seconds.
-const MOST_SECONDS: f64 = 2.0;
+/// Fewer columns of one axis are not those of a body.
+const LEAST_AXES: usize = 3;
 
 /// Separated by commas, semicolons or tabs. Ignores columns without a coordinate suffix (frame number, visibility), except
 /// times. Errors have their line.
@@ -50,18 +51,25 @@ pub fn read(bytes: &[u8], choices: Choices) -> Result<Found, RecordingError> {
         .records()
         .collect::<Result<_, _>>()
         .map_err(|error| RecordingError::Kind { kind: "CSV", reason: error.to_string() })?;
-    let rows = long::wide(joined(rows))?;
-    let (columns, below) = rows
-        .split_first()
-        .ok_or_else(|| RecordingError::Kind { kind: "CSV", reason: "it is empty".into() })?;
+    if let Some(found) = qualisys::read(&rows)? {
+        return Ok(found);
+    }
     if let Some(found) = layered(&rows)? {
         return Ok(found);
     }
+    let rows = long::wide(melted::cast(stacked(joined(rows)))?)?;
+    let (columns, below) = rows
+        .split_first()
+        .ok_or_else(|| RecordingError::Kind { kind: "CSV", reason: "it is empty".into() })?;
     let mut found = match table::read(columns, below, choices)? {
         Some(found) => found,
-        None => plain(columns, below)?,
+        None => {
+            let apart = long::apart(columns, below)?;
+            let (columns, below) = apart.as_deref().and_then(<[_]>::split_first).unwrap_or((columns, below));
+            plain(columns, below)?
+        }
     };
-    match rate_hz(columns, below) {
+    match columns::rate_hz(columns, below) {
         Some(rate_hz) => found.rate_hz = rate_hz,
         None => found.remarks.push("the file states no frame rate".into()),
     }
@@ -80,6 +88,33 @@ fn joined(mut rows: Vec<StringRecord>) -> Vec<StringRecord> {
     };
     let header: StringRecord = rows[coords].iter().enumerate().map(name).collect();
     rows.drain(..coords);
+    rows[0] = header;
+    rows
+}
+
+/// A row of names above one of axes, as pandas writes them, as one row of `NAME_x`. A row with the title of the index alone may
+/// follow.
+fn stacked(mut rows: Vec<StringRecord>) -> Vec<StringRecord> {
+    let [names, axes, ..] = rows.as_slice() else { return rows };
+    if axes.iter().filter(|cell| cell.eq_ignore_ascii_case("x")).count() < LEAST_AXES {
+        return rows;
+    }
+    let mut name = "";
+    let mut header = StringRecord::new();
+    for (column, axis) in axes.iter().enumerate() {
+        let own = names.get(column).unwrap_or_default();
+        name = if own.is_empty() { name } else { own };
+        match (name, axis) {
+            (_, "") => header.push_field(own),
+            ("", axis) => header.push_field(axis),
+            (name, axis) => header.push_field(&format!("{name}_{axis}")),
+        }
+    }
+    let is_title = |row: &StringRecord| {
+        row.iter().skip(1).all(str::is_empty) && row.get(0).is_some_and(|cell| number(cell).is_none())
+    };
+    let titles = usize::from(rows.get(2).is_some_and(is_title));
+    rows.drain(..=titles);
     rows[0] = header;
     rows
 }
@@ -104,7 +139,8 @@ fn plain(columns: &StringRecord, rows: &[StringRecord]) -> Result<Found, Recordi
         );
         return Err(RecordingError::Kind { kind: "CSV", reason });
     }
-    let is_kinect = !is_separated && KINECT.iter().all(|joint| markers.iter().any(|(name, _)| name == joint));
+    let has = |joint: &str| markers.iter().any(|(name, _)| anatomy::without_prefix(name) == joint);
+    let is_kinect = !is_separated && KINECT.iter().all(|joint| has(joint));
     let (mm, up, source) = if is_kinect {
         let reason = "for joints are named as the Kinect SDK does".into();
         (1000.0, Up::Y, Source::Guess { reason, sure: true })
@@ -124,6 +160,16 @@ fn plain(columns: &StringRecord, rows: &[StringRecord]) -> Result<Found, Recordi
         check_width(row, columns)?;
         frames.push(points(row, &places)?);
     }
+    let numbers = columns::place(columns, &columns::FRAMES).map_or(rows.len(), |column| {
+        rows.iter().filter_map(|row| row.get(column)).collect::<HashSet<&str>>().len()
+    });
+    let remark = (numbers < rows.len()).then(|| {
+        format!(
+            "{} rows share {numbers} frame numbers and are read as frames of one person: add a column person_id if they are \
+             several people, or put each recording into a separate file",
+            rows.len()
+        )
+    });
     Ok(Found {
         others: Vec::new(),
         planar: false,
@@ -132,7 +178,7 @@ fn plain(columns: &StringRecord, rows: &[StringRecord]) -> Result<Found, Recordi
         frames,
         unit: Known { value: Unit { mm }, source: source.clone() },
         up: Known { value: up, source },
-        remarks: Vec::new(),
+        remarks: remark.into_iter().collect(),
     })
 }
 
@@ -151,13 +197,12 @@ pub(super) fn markers_of<const FIELDS: usize>(
     columns: &StringRecord,
     coordinate: impl Fn(&str) -> Option<(&str, usize)>,
 ) -> Result<Vec<Marker<FIELDS>>, RecordingError> {
-    let mut markers: Vec<Marker<FIELDS>> = Vec::new();
+    let (mut markers, mut known): (Vec<Marker<FIELDS>>, HashMap<&str, usize>) = (Vec::new(), HashMap::new());
     for (index, column) in columns.iter().enumerate() {
         let Some((name, axis)) = coordinate(column) else {
             continue;
         };
-        let known = markers.iter().position(|(known, _)| known == name);
-        let marker = known.unwrap_or_else(|| {
+        let marker = *known.entry(name).or_insert_with(|| {
             markers.push((name.to_owned(), [None; FIELDS]));
             markers.len() - 1
         });
@@ -167,20 +212,6 @@ pub(super) fn markers_of<const FIELDS: usize>(
         }
     }
     Ok(markers)
-}
-
-/// Frames per second by a column of times and the median of its steps, to three decimals.
-fn rate_hz(columns: &StringRecord, rows: &[StringRecord]) -> Option<f64> {
-    let is_time = |column: &str| TIMES.iter().any(|known| column.eq_ignore_ascii_case(known));
-    let column = columns.iter().position(is_time)?;
-    let times: Vec<f64> = rows.iter().filter_map(|row| number(row.get(column)?)).collect();
-    // People of one frame have the same time.
-    let steps = times.windows(2).map(|two| two[1] - two[0]);
-    let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
-    steps.sort_unstable_by(f64::total_cmp);
-    let step = steps.get(steps.len() / 2).copied()?;
-    let rate_hz = if step > MOST_SECONDS { 1000.0 / step } else { 1.0 / step };
-    Some((1000.0 * rate_hz).round() / 1000.0).filter(|rate| rate.is_finite() && *rate > 0.0)
 }
 
 /// A table with names in a row above `Frame, ..., X, Y, Z, X, Y, Z`: of Vicon Nexus (units below, z up) and its predecessors
@@ -274,6 +305,8 @@ fn unseparated(column: &str) -> Option<(&str, usize)> {
 
 #[cfg(test)]
 mod tests {
+    mod apart;
+
     use super::*;
 
     fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
@@ -322,6 +355,12 @@ mod tests {
         for guess in ["lengths are taken as metres: a guess", "y is taken as up: a guess", "20 of 20 names"] {
             assert!(remarks.contains(guess), "{guess}: {remarks}");
         }
+        let users = [7000, 7032].map(|time| format!("{time},{row},5\n{time},{row},6\n")).concat();
+        let second = Choices { person: Some(2), ..Choices::default() };
+        let text = format!("Timestamp,{header},User-ID\n{users}");
+        let found = crate::readers::read(text.as_bytes(), "csv", second).expect("two people");
+        assert_eq!((found.frames.len(), found.rate_hz), (2, 31.25));
+        assert!((found.by_name(1)["head"][2] - 700.0).abs() < 1e-9);
         // A name without all three axes is another column; a name in capitals is not split.
         let other = read(b"HeadX,HeadY,HeadZ,ForceX\n1,2,3,4\n").expect("valid");
         assert_eq!((other.names, other.unit.value), (vec!["Head".to_owned()], Unit::MM));
@@ -379,6 +418,25 @@ mod tests {
         ] {
             assert_eq!(read(text.as_bytes()).expect("valid").frames, plain, "{text}");
         }
+    }
+
+    #[test]
+    fn names_above_axes_are_joined_as_pandas_writes_them() {
+        let columns = |of: fn(&str) -> String| ["LFHD", "LASI", "LTOE"].map(of).join(",");
+        let (names, merged) = (columns(|name| [name; 3].join(",")), columns(|name| format!("{name},,")));
+        let axes = columns(|_| "x,y,z".into());
+        let rows = "0,1,2,1700,4,5,1000,7,8,60\n1,1,2,1701,4,5,1000,7,8,60\n";
+        for text in [
+            format!(",{names}\n,{axes}\n{rows}"),
+            format!("marker,{names}\naxis,{axes}\nframe{}\n{rows}", ",".repeat(9)),
+            format!("frame,{merged}\n,{}\n{rows}", axes.to_uppercase()),
+        ] {
+            let found = read(text.as_bytes()).unwrap_or_else(|error| panic!("{error}: {text}"));
+            assert_eq!((found.names.len(), found.frames.len()), (3, 2), "{text}");
+            assert_eq!(found.frames[1][0], Some([1.0, 2.0, 1701.0]), "{text}");
+        }
+        let timed = format!(",{names}\ntime,{axes}\n{}", rows.replace("1,1,2,", "0.04,1,2,"));
+        assert_eq!(read(timed.as_bytes()).expect("valid").rate_hz, 25.0);
     }
 
     #[test]

@@ -23,7 +23,7 @@ use aspect::Aspect;
 use document::Document;
 use layouts::NAMES;
 use people::{People, distance};
-use points::LEAST_CONFIDENCE;
+use points::{LEAST_CONFIDENCE, Person, full_confidence};
 
 pub const READER: Reader = Reader {
     name: "keypoints",
@@ -101,17 +101,20 @@ fn found(document: Document, choices: Choices, about: Option<String>) -> Result<
         ));
     }
     remarks.extend(of_document);
-    let unsure: usize = frames
-        .iter_mut()
-        .flatten()
-        .map(|person| {
-            let layout = if has_depth || person.layout == own { layout } else { person.layout };
-            person.placed(layout, has_depth)
-        })
-        .sum();
+    let order = |person: &Person| if has_depth || person.layout == own { layout } else { person.layout };
+    let full = full_confidence(everyone().flat_map(|person| person.confidences(order(person), has_depth)));
+    if full > 1.0 {
+        remarks.push(format!("confidences are taken as parts of {full} (a guess by their range)"));
+    }
+    let people = frames.iter_mut().flatten();
+    let placed = people.map(|person| {
+        let layout = order(person);
+        person.placed(layout, has_depth, full)
+    });
+    let unsure: usize = placed.sum();
     if unsure > 0 {
-        remarks
-            .push(format!("{unsure} points below a confidence of {LEAST_CONFIDENCE} are treated as missing"));
+        let least = LEAST_CONFIDENCE * full;
+        remarks.push(format!("{unsure} points below a confidence of {least} are treated as missing"));
     }
     let points: Vec<&Point3> =
         frames.iter().flatten().flat_map(|person| person.points.iter().flatten()).collect();

@@ -65,7 +65,8 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
             75 | 76 => 25,
             other => {
                 return Err(wrong(format!(
-                    "{other} numbers, expected 20 or 25 joints with 3 each, optionally after a frame number"
+                    "{other} numbers, expected 20 or 25 joints with 3 each, optionally after a frame number: write others, such as \
+                     YOLO's keypoints, to a CSV file with columns NAME_x and NAME_y"
                 )));
             }
         };

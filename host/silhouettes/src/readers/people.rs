@@ -11,13 +11,17 @@ use crate::silhouette::{
 
 /// Body markers of a person.
 const LEAST: usize = 4;
+/// People whose names a remark lists.
+const SHOWN: usize = 10;
 
 /// The person of this number, from 1.
 pub fn pick(mut found: Found, wanted: usize) -> Result<Found, RecordingError> {
     let missing = |count: usize| RecordingError::Person { wanted, found: count };
     let index = wanted.checked_sub(1);
     if found.others.is_empty() {
-        return by_prefix(found, index).map_err(missing);
+        // The file's names remain those of the recording, for templates that have them.
+        let names = prefixed(&found.names).unwrap_or_else(|| found.names.clone());
+        return by_prefix(found, &names, index).map_err(missing);
     }
     let count = 1 + found.others.len();
     let index = index.filter(|index| *index < count).ok_or_else(|| missing(count))?;
@@ -25,6 +29,34 @@ pub fn pick(mut found: Found, wanted: usize) -> Result<Found, RecordingError> {
         found.frames = found.others.swap_remove(index - 1);
     }
     Ok(found)
+}
+
+/// The names with the text before a separator as a prefix, if they are those of a body only then: `Ann_LASI` of several people, or
+/// `PoseLandmark.NOSE`.
+pub fn prefixed(names: &[String]) -> Option<Vec<String>> {
+    const SEPARATORS: [char; 4] = ['.', '_', '-', ' '];
+    let known = |names: &[String]| Anatomy::of(names).body.len();
+    if known(names) >= LEAST {
+        return None;
+    }
+    let split = |separator: char| -> Vec<String> {
+        let split = |name: &String| match parts(name, separator) {
+            Some((prefix, own)) if !name.contains(':') && !prefix.is_empty() => format!("{prefix}:{own}"),
+            _ => name.clone(),
+        };
+        names.iter().map(split).collect()
+    };
+    let used = SEPARATORS.into_iter().filter(|separator| names.iter().any(|name| name.contains(*separator)));
+    let all = used.map(|separator| {
+        let names = split(separator);
+        (known(&names), names)
+    });
+    all.max_by_key(|(known, _)| *known).filter(|(known, _)| *known >= LEAST).map(|(_, names)| names)
+}
+
+fn parts(name: &str, separator: char) -> Option<(&str, &str)> {
+    // The path of a Python module has several.
+    if separator == '.' { name.rsplit_once(separator) } else { name.split_once(separator) }
 }
 
 struct Group<'a> {
@@ -35,10 +67,10 @@ struct Group<'a> {
 }
 
 /// Fails with the number of people.
-fn by_prefix(found: Found, index: Option<usize>) -> Result<Found, usize> {
+fn by_prefix(found: Found, all: &[String], index: Option<usize>) -> Result<Found, usize> {
     let alone = |found: Found| if index == Some(0) { Ok(found) } else { Err(1) };
     let mut groups: Vec<Group<'_>> = Vec::new();
-    for (place, name) in found.names.iter().enumerate() {
+    for (place, name) in all.iter().enumerate() {
         let prefix = anatomy::prefix(name);
         match groups.iter_mut().find(|group| group.prefix == prefix) {
             Some(group) => group.places.push(place),
@@ -49,13 +81,13 @@ fn by_prefix(found: Found, index: Option<usize>) -> Result<Found, usize> {
         return alone(found);
     }
     for group in groups.iter_mut().filter(|group| group.places.len() >= LEAST) {
-        let names: Vec<String> = group.places.iter().map(|place| found.names[*place].clone()).collect();
+        let names: Vec<String> = group.places.iter().map(|place| all[*place].clone()).collect();
         let body: Vec<usize> = Anatomy::of(&names).body.iter().map(|index| group.places[*index]).collect();
         let seen = |frame: &Vec<Option<Point3>>| {
             body.iter().filter(|place| frame.get(**place).is_some_and(Option::is_some)).count()
         };
         group.visible = found.frames.iter().map(seen).sum();
-        group.body = body.iter().map(|place| anatomy::without_prefix(&found.names[*place])).collect();
+        group.body = body.iter().map(|place| anatomy::without_prefix(&all[*place])).collect();
     }
     let shares = |a: usize| {
         let others = groups.iter().enumerate().filter(|(b, other)| a != *b && other.body.len() >= LEAST);
@@ -70,26 +102,27 @@ fn by_prefix(found: Found, index: Option<usize>) -> Result<Found, usize> {
     let most = people.iter().map(|group| groups[*group].visible).max().unwrap_or(0);
     people.sort_by_key(|group| 2 * groups[*group].visible < most);
     let listed: Vec<String> = (1..)
-        .zip(&people)
+        .zip(people.iter().take(SHOWN))
         .map(|(number, group)| match groups[*group].prefix {
             "" => format!("{number} without a prefix"),
             prefix => format!("{number} {prefix}"),
         })
         .collect();
-    let remark = format!("{} people: {} (--person selects one, default 1)", people.len(), listed.join(", "));
+    let (listed, more) = (listed.join(", "), if people.len() > SHOWN { ", ..." } else { "" });
+    let remark = format!("{} people: {listed}{more} (--person selects one, default 1)", people.len());
     let person = *index.and_then(|index| people.get(index)).ok_or(people.len())?;
     let others = groups.iter().enumerate().filter(|(group, _)| !people.contains(group));
     let of_no_person = others
         .flat_map(|(_, group)| &group.places)
-        .filter(|place| !groups[person].body.contains(anatomy::without_prefix(&found.names[**place])));
+        .filter(|place| !groups[person].body.contains(anatomy::without_prefix(&all[**place])));
     let places: Vec<usize> = groups[person].places.iter().chain(of_no_person).copied().collect();
     let names = places.iter().map(|place| found.names[*place].clone()).collect();
-    let mut all = Found { names, ..found };
-    for frame in &mut all.frames {
+    let mut own = Found { names, ..found };
+    for frame in &mut own.frames {
         *frame = places.iter().map(|place| frame.get(*place).copied().flatten()).collect();
     }
-    all.remarks.push(remark);
-    Ok(all)
+    own.remarks.push(remark);
+    Ok(own)
 }
 
 #[cfg(test)]
@@ -149,6 +182,47 @@ mod tests {
         });
         let hidden = hidden.collect::<Vec<String>>().join("\n");
         assert_eq!(person(&hidden, None).expect("a table").by_name(0)["LASI"][0], 3500.0);
+    }
+
+    #[test]
+    fn people_and_a_module_may_be_before_other_separators() {
+        for separator in ["_", ".", "-", " "] {
+            let text =
+                two().replace("Ann:", &format!("P1{separator}")).replace("Ben:", &format!("P2{separator}"));
+            let ben = person(&text, Some(2)).unwrap_or_else(|error| panic!("{error}: `{separator}`"));
+            assert_eq!(ben.by_name(0)["LASI"][0], 3500.0);
+            assert!(
+                ben.remarks().iter().any(|remark| remark.contains("2 people: 1 P1, 2 P2")),
+                "`{separator}`"
+            );
+        }
+        let names = ["LEFT_SHOULDER", "RIGHT_SHOULDER", "LEFT_HIP", "RIGHT_HIP", "LEFT_KNEE", "RIGHT_KNEE"];
+        let of_module = names.map(|name| format!("mp.solutions.pose.PoseLandmark.{name}"));
+        let prefixed = super::prefixed(&of_module).expect("a body");
+        assert!(
+            prefixed.iter().zip(names).all(|(found, name)| found.ends_with(&format!("PoseLandmark:{name}")))
+        );
+        assert_eq!(super::prefixed(&names.map(str::to_owned)), None);
+    }
+
+    #[test]
+    fn the_names_of_the_file_remain_with_others_before_them() {
+        let text = two().replace("Ann:", "Suit_").replace("Ben:", "Prop_Box");
+        let suit = person(&text, None).expect("a table").by_name(0)["Suit_LASI"];
+        assert_eq!(suit, person(&text, None).expect("a table").by_name(0)["LASI"]);
+    }
+
+    #[test]
+    fn a_remark_lists_few_of_many_people() {
+        let suit = |n: usize| SUIT.map(|name| format!(",P{n}:{name}_x,P{n}:{name}_y,P{n}:{name}_z")).concat();
+        let header: String = (1..=11).map(suit).collect();
+        let row = ",500,20,900".repeat(11 * SUIT.len());
+        let remarks =
+            person(&format!("frame{header}\n0{row}\n"), None).expect("a table").remarks().join("; ");
+        assert!(
+            remarks.contains("11 people: 1 P1,") && remarks.contains("10 P10, ... (--person"),
+            "{remarks}"
+        );
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Recordings of named points over time, the common form of all motion-capture files. A reader returns the
 //! file's own unit and axes with their source ([`Found`]); [`Found::settled`] converts to mm and z up.
 
-use super::{body, keypoints::aspect::Aspect, posture};
+use super::{body, keypoints::aspect::Aspect, people::prefixed, posture};
 use crate::silhouette::{anatomy::Anatomy, capsule::Point3};
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -236,7 +236,8 @@ impl Found {
             ));
         }
         remarks.extend(choices.aspect.filter(|_| !self.planar).map(Aspect::ignored));
-        let anatomy = Anatomy::of(&names);
+        let with_prefixes = prefixed(&names);
+        let anatomy = Anatomy::of(with_prefixes.as_deref().unwrap_or(&names));
         body::add_neck(&mut names, &anatomy.aliases, &mut frames);
         let (unit, doubtful) = body::plausible(self.unit.unless(choices.unit), &frames, &anatomy.body);
         let (up, inverted) = posture::checked(self.up.unless(choices.up), &frames, &anatomy, self.planar);

@@ -118,7 +118,10 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     }
     let rate_hz = if has_rate { rate_hz } else { 0.0 };
     let up = Known { value: Up::Y, source: Source::Format };
-    Ok(Found { names, rate_hz, frames, others: Vec::new(), planar: false, unit, up, remarks })
+    // Of programs that measure in one picture, such as Sports2D.
+    let mut points = frames.iter().flatten().flatten().peekable();
+    let planar = points.peek().is_some() && points.all(|point| point[2] == 0.0);
+    Ok(Found { names, rate_hz, frames, others: Vec::new(), planar, unit, up, remarks })
 }
 
 /// Points with values in the longest row.
@@ -169,4 +172,24 @@ pub(super) fn point(cells: [&str; 3], line: usize) -> Result<Option<Point3>, Rec
             .ok_or_else(|| RecordingError::Line { line, reason: format!("`{cell}` is not a number") })?;
     }
     Ok(Some(point))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_of_one_picture_have_one_view() {
+        let file = |depth: &str| {
+            format!(
+                "PathFileType\t4\t(X/Y/Z)\ta.trc\nDataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\n30\t30\t2\t2\tm\n\
+                 Frame#\tTime\tHead\t\t\tLHeel\t\t\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n\
+                 0\t0.0\t2.0\t1.7\t0.0\t2.1\t0.1\t0.0\n1\t0.03\t2.0\t1.7\t0.0\t2.2\t0.1\t{depth}\n"
+            )
+        };
+        for (depth, planar) in [("0.0", true), ("0.2", false)] {
+            let found = read(file(depth).as_bytes()).expect("a TRC file");
+            assert_eq!((found.planar, found.frames.len()), (planar, 2), "{depth}");
+        }
+    }
 }

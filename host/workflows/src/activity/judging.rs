@@ -149,7 +149,7 @@ pub(super) fn check_same(request: &EvaluateRequest, model: &Model) -> Result<()>
     for (own, known) in request.same() {
         let same = || format!("{own}={known}");
         if !of_samples.contains(own) {
-            // The names of a blind set are known by its recorded opening only.
+            // Only a recorded opening may show the names of a blind set.
             let only = match request.open_blind_set {
                 Some(_) => String::new(),
                 None => format!(", only {}", of_samples.into_iter().collect::<Vec<_>>().join(", ")),

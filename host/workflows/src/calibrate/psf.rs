@@ -261,6 +261,7 @@ mod tests {
         let images = ["far.png", "near.png"].map(|name| folder.path().join(name)).to_vec();
         let request = CalibratePsfRequest { images, optics: file, ..CalibratePsfRequest::default() };
         let error = fit(&request, &Context::unattended()).unwrap_err();
-        assert!(error.is_usage() && error.to_string().contains("lens.toml"), "{error}");
+        let text = error.to_string();
+        assert!(error.is_usage() && text.contains("lens.toml") && text.contains("already found"), "{text}");
     }
 }

@@ -56,12 +56,13 @@ Example: farnear calibrate stack slices --step-mm 0.1 --out lens.toml
 pub struct CalibrateStackRequest {
     /// A folder with the slices in the order of their numbers, a TIFF with several pages, or the folder of `farnear rig sequence`.
     pub stack: PathBuf,
-    /// Distance between neighbouring slices in mm, or in any unit of the stage (um, steps); all depths are in that unit then. By
-    /// default that of the TIFF's metadata or of the rig's record.
+    /// Distance between neighbouring slices in mm (0.5 um is 0.0005). Steps in degrees, dioptres or volts give depths in that
+    /// unit, also where a name has mm. By default the step of the TIFF's metadata, of positions in the names (z-83um.png) or of
+    /// the rig's record.
     #[cfg_attr(feature = "clap", arg(long, value_name = "MM"))]
     pub step_mm: Option<f64>,
-    /// Side of a pixel at the target, in um, or in thousandths of the unit of the steps [default: that of the TIFF's metadata, if the step is theirs, too]. Without
-    /// it slopes and meshes are per pixel.
+    /// Side of a pixel at the target, in um [default: that of the TIFF's metadata, if the step is theirs, too]. Without it slopes
+    /// and meshes are per pixel.
     #[cfg_attr(feature = "clap", arg(long, value_name = "UM"))]
     pub object_pixel_um: Option<f64>,
     /// Distance of the far-focused plane of a pair, mm; without it depth is relative.
@@ -124,6 +125,20 @@ impl Request for CalibrateStackRequest {
     ];
     type Figures = StackFigures;
 
+    fn check(&self) -> Result<()> {
+        let given =
+            [("step-mm", self.step_mm), ("object-pixel-um", self.object_pixel_um), ("far-mm", self.far_mm)];
+        for (name, value) in given {
+            if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
+                let reversed = "; if the first slice is focused nearest, give --near-first";
+                let remedy = if name == "step-mm" && value < 0.0 { reversed } else { "" };
+                let expected = format!("expected a positive number{remedy}");
+                return Err(WorkflowError::parameter(name, value, expected));
+            }
+        }
+        Ok(())
+    }
+
     fn run(&self, context: &Context<'_>) -> Result<StackFigures> {
         calibrate(self, context)
     }
@@ -174,6 +189,7 @@ pub struct StackFigures {
 }
 
 pub fn calibrate(request: &CalibrateStackRequest, context: &Context<'_>) -> Result<StackFigures> {
+    request.check()?;
     let plot = match &request.plot {
         Some(file) => Some((file, Format::of(file)?)),
         None => None,
@@ -202,8 +218,12 @@ pub fn calibrate(request: &CalibrateStackRequest, context: &Context<'_>) -> Resu
     let found = calibrate_stack(&slices, &settings, &proceed);
     context.cancel.check("calibrating the lens")?;
     let found = found.map_err(|error| match error {
-        StackError::NotPositive { name, value } => WorkflowError::parameter(name, value, "a positive number"),
-        StackError::OutOfRange { name, value, expected } => WorkflowError::parameter(name, value, expected),
+        StackError::NotPositive { name, value } => {
+            WorkflowError::parameter(name, value, "expected a positive number")
+        }
+        StackError::OutOfRange { name, value, expected } => {
+            WorkflowError::parameter(name, value, format!("expected {expected}"))
+        }
         error => WorkflowError::parameter("stack", request.stack.display(), error.to_string()),
     })?;
     let figures = figures(&found, &listed, slices[0].dim(), request);
@@ -269,8 +289,10 @@ impl Listed {
                 }
                 let step_mm = match (request.step_mm, positions_um) {
                     (Some(step_mm), stated) => {
-                        let stated = stated.map(|positions| even_step(&positions, request));
-                        // The metadata's pixel is in um, --step-mm may be in any unit.
+                        let stated = stated
+                            .or_else(|| stack::positions_in_names(&images))
+                            .map(|positions| even_step(&positions, request));
+                        // The metadata's pixel is in um, --step-mm may be in degrees or volts.
                         if !stated.as_ref().is_some_and(|stated| agrees(step_mm, stated)) {
                             object_pixel_um = None;
                         }
@@ -279,8 +301,24 @@ impl Listed {
                     }
                     (None, Some(positions)) => even_step(&positions, request)? * 1e-3,
                     (None, None) => {
-                        let expected = "the distance between neighbouring slices; these files do not tell it";
-                        return Err(WorkflowError::parameter("step-mm", "(none)", expected));
+                        let Some(positions) = stack::positions_in_names(&images) else {
+                            let expected = "the distance between neighbouring slices: neither metadata nor names such as z-83um.png \
+                                            state it";
+                            return Err(WorkflowError::parameter("step-mm", "(none)", expected));
+                        };
+                        // Positions in names may be rounded.
+                        let step_mm = 1e-3
+                            * even_step(&positions, request).map_err(|error| {
+                                let expected = format!(
+                                    "the distance between neighbouring slices, for by their names: {error}"
+                                );
+                                WorkflowError::parameter("step-mm", "(none)", expected)
+                            })?;
+                        let read = rounded_for(step_mm, step_mm, 6);
+                        remarks.push(format!(
+                            "the names of the slices state a step of {read} mm, which is used"
+                        ));
+                        step_mm
                     }
                 };
                 if request.near_first {
@@ -302,7 +340,7 @@ fn contradiction(step_mm: f64, stated: Option<Result<f64>>) -> Option<String> {
         Ok(step_um) => format!("a step of {} mm", rounded_for(step_um * 1e-3, step_um * 1e-3, 4)),
         Err(error) => format!("uneven positions ({error})"),
     };
-    Some(format!("the file states {stated}, and --step-mm {step_mm} is used: check the unit"))
+    Some(format!("the files state {stated}, and --step-mm {step_mm} is used: check the unit"))
 }
 
 /// Mean step between positions that are in order, above 0.
@@ -344,12 +382,7 @@ fn read(
                 Samples::Integer(_) => image.white_level.unwrap_or(1.0),
                 Samples::Float => f32::INFINITY,
             };
-            let seen = frames.correct(image.pixels.view())?;
-            image.pixels.zip_mut_with(&seen, |value, seen| {
-                if *value < clipped {
-                    *value = seen.min(clipped);
-                }
-            });
+            image.pixels = frames.correct_below(image.pixels.view(), clipped)?;
         }
         filled += fill_specks(&mut image.pixels).len();
         let holes = image.pixels.iter().filter(|value| !value.is_finite()).count();

@@ -21,18 +21,23 @@ const CODE_STEP: f32 = 1.0 / 255.0;
 /// object in front of black is defocused in most images.
 const HALF: f32 = 0.5;
 const BEYOND_PX: usize = 12;
+/// Borders of a registration move from image to image by more than this. The edge of an object in focus moved by at most 1 px: a
+/// little defocus lights the pixels in front of it.
+const STILL_PX: usize = 3;
 
 /// Above, below, left and right.
 pub(super) type Sides = [bool; 4];
 
-/// How an image begins behind each black border.
-pub(super) type Borders = [Option<Edge>; 4];
+/// Black borders of an image.
+pub(super) type Borders = [Option<Border>; 4];
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Edge {
-    Abrupt,
-    Gradual,
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Border {
+    deepest_px: usize,
+    /// Whether the image has its brightness next to the border.
+    is_abrupt: bool,
 }
+
 const SIDES: [(bool, bool); 4] = [(false, false), (false, true), (true, false), (true, true)];
 
 /// The image as seen from a side: its border is above.
@@ -49,12 +54,15 @@ fn from_side<S: RawData>(
     image
 }
 
-/// Sides on which black borders come from registration, from those of each image. One that all images have and that is
-/// gradual in most is the scene's.
+/// Sides on which black borders come from registration, from those of each image. One that all images have is the scene's if
+/// it is gradual in most, or in the same place where it is not.
 pub(super) fn of_registration(images: &[Borders]) -> Sides {
     std::array::from_fn(|side| {
-        let abrupt = images.iter().filter(|sides| sides[side] == Some(Edge::Abrupt)).count();
-        images.iter().any(|sides| sides[side].is_none()) || 2 * abrupt > images.len()
+        let abrupt = images.iter().filter_map(|sides| sides[side]).filter(|border| border.is_abrupt);
+        let depths: Vec<usize> = abrupt.map(|border| border.deepest_px).collect();
+        let moves =
+            depths.iter().max().zip(depths.iter().min()).is_some_and(|(most, least)| most - least > STILL_PX);
+        images.iter().any(|sides| sides[side].is_none()) || (moves && 2 * depths.len() > images.len())
     })
 }
 
@@ -68,8 +76,9 @@ pub(super) fn of_image(image: &Array2<f32>, code_step: f32) -> Borders {
             let mut beyond = column.iter().skip(depth + 1).take(BEYOND_PX);
             beyond.next().is_some_and(|second| *second >= HALF * beyond.sum::<f32>() / (BEYOND_PX - 1) as f32)
         });
-        let edge = if 2 * abrupt.count() > borders.len() { Edge::Abrupt } else { Edge::Gradual };
-        (!borders.is_empty()).then_some(edge)
+        let is_abrupt = 2 * abrupt.count() > borders.len();
+        let deepest_px = borders.iter().map(|(_, depth)| *depth).max();
+        deepest_px.map(|deepest_px| Border { deepest_px, is_abrupt })
     })
 }
 
@@ -210,7 +219,7 @@ mod tests {
 
     /// A straight object on a black background, and registered images none of which is whole.
     #[test]
-    fn a_gradual_border_that_all_images_have_is_the_scenes() {
+    fn a_gradual_or_still_border_that_all_images_have_is_the_scenes() {
         let image = |left: usize, right: usize, blur: f32| {
             let ramp = |x: usize| (0.5 * (x as f32 - left as f32) / blur).clamp(0.0, 0.5);
             Array2::from_shape_fn((120, 160), |(_, x)| if x < 160 - right { ramp(x + 1) } else { 0.0 })
@@ -227,5 +236,7 @@ mod tests {
         assert!(images[1][(50, 5)] == 0.0 && images[1][(50, 155)].is_nan());
         let registered = [image(20, 0, 1.0), image(25, 0, 1.0), image(22, 0, 2.0)];
         assert!(of(&registered).0[2]);
+        let focused = [image(20, 0, 1.0), image(19, 0, 2.0), image(20, 0, 1.0), image(12, 0, 40.0)];
+        assert!(!of(&focused).0[2], "an object in focus in most images");
     }
 }

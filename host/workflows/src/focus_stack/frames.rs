@@ -189,6 +189,7 @@ where
     let Some(composed) = slice_order::composed(&neighbours.sharpness) else {
         return comparison.judged(neighbours, positions);
     };
+    // Registrations cost most of the time: those of the other neighbours are kept.
     let mut positions = positions.to_vec();
     positions.remove(composed);
     comparison.chosen.remove(composed);
@@ -254,7 +255,7 @@ struct Link {
 }
 
 impl Neighbours {
-    /// Whether a frame is much less sharp than another in most blocks where that has detail; true if this is not known.
+    /// Whether a frame is much less sharp than another in most blocks where that has detail; also true without the sharpness of one of them.
     fn is_less_sharp(&self, frame: usize, other: usize) -> bool {
         let [frame, other] = [frame, other].map(|index| &self.sharpness[index]);
         let least = DETAIL * other.iter().copied().fold(0.0, f64::max);

@@ -48,6 +48,9 @@ pub(crate) fn check_folder(name: &'static str, path: &Path) -> Result<()> {
     let unusable = |expected: String| Err(WorkflowError::parameter(name, path.display(), expected));
     let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
     let folder = parent.unwrap_or(Path::new("."));
+    if folder.exists() && !folder.is_dir() {
+        return unusable(format!("{} is not a folder: name another place", folder.display()));
+    }
     if !folder.is_dir() {
         return unusable(format!(
             "the folder {} does not exist: create it, or name another place",
@@ -189,7 +192,7 @@ mod tests {
         let sample = |plot: Option<PathBuf>| Sample { plot, ..Sample::default() };
         for (plot, phrase) in [
             ("nodir/x.svg", "nodir does not exist: create it, or name another place"),
-            ("file/x.svg", "file does not exist"),
+            ("file/x.svg", "file is not a folder: name another place"),
             ("taken", "it is a folder: name a file"),
         ] {
             let error = check_folders(&sample(Some(place(plot)))).expect_err("refused");

@@ -11,13 +11,13 @@ use std::{
     fs::{self, File},
     io::{BufReader, ErrorKind, Read, Write},
     path::{Path, PathBuf},
-    sync::mpsc::{self, SyncSender},
+    sync::mpsc::{self, Receiver, SyncSender},
     thread,
     time::{Duration, Instant},
 };
 
 use farnear_capture::camera::{Image, pixels::Layout};
-use farnear_depth::optics::Optics;
+use farnear_depth::{measure::Measurement, optics::Optics, stream::Stream};
 use farnear_files::staging::StagingError;
 use ndarray::Array2;
 use serde::Serialize;
@@ -240,7 +240,45 @@ fn read_ahead(mut recording: Recording, to: &SyncSender<Result<Ready>>) {
     }
 }
 
-/// Plays a recording and passes each pair with its depth to `on_depth`. One thread reads, another computes.
+struct Computed {
+    pair: RecordedPair,
+    /// `None` for two images of different scenes.
+    found: Option<Measurement>,
+    arrived: Instant,
+    /// To the map.
+    latency_ms: f64,
+}
+
+/// Computes depth of each pair when it is due after `begin`, or at once without it; ends as [`read_ahead`].
+fn compute(
+    depths: &mut Stream,
+    pairs: Receiver<Result<Ready>>,
+    begin: Option<Instant>,
+    context: &Context<'_>,
+    to: &SyncSender<Result<Computed>>,
+) {
+    let mut next = |ready: Result<Ready>| {
+        let Ready { pair, grey } = ready?;
+        let left = || begin.map_or(Duration::ZERO, |begin| pair.at.saturating_sub(begin.elapsed()));
+        while !left().is_zero() {
+            context.cancel.check("playing a recording")?;
+            thread::sleep(LOOK.min(left()));
+        }
+        context.cancel.check("playing a recording")?;
+        let arrived = Instant::now();
+        let found = measure(depths, grey, context)?;
+        Ok(Computed { found, pair, arrived, latency_ms: arrived.elapsed().as_secs_f64() * 1e3 })
+    };
+    for ready in pairs {
+        let computed = next(ready);
+        let last = computed.is_err();
+        if to.send(computed).is_err() || last {
+            return;
+        }
+    }
+}
+
+/// Plays a recording and passes each pair with its depth to `on_depth`, while other threads read and compute the next.
 pub fn play(
     path: &Path,
     fast: bool,
@@ -253,31 +291,27 @@ pub fn play(
     let (begin, mut latencies_ms, mut seconds) = (Instant::now(), Vec::new(), 0.0);
     let mut unrelated_pairs = 0;
     thread::scope(|scope| {
-        // The reader ends when the receiver is dropped, at the end of this closure.
+        // Each thread ends when its receiver is dropped, the last of them at the end of this closure.
         let (to, pairs) = mpsc::sync_channel(AHEAD);
+        let (computed, maps) = mpsc::sync_channel(0);
         scope.spawn(move || read_ahead(recording, &to));
-        for ready in pairs {
-            let Ready { pair: RecordedPair { at, far, near }, grey } = ready?;
-            while !fast && begin.elapsed() < at {
-                context.cancel.check("playing a recording")?;
-                thread::sleep(LOOK.min(at.saturating_sub(begin.elapsed())));
-            }
-            context.cancel.check("playing a recording")?;
+        scope.spawn(move || compute(&mut depths, pairs, (!fast).then_some(begin), context, &computed));
+        for map in maps {
+            let Computed { pair: RecordedPair { at, far, near }, found, arrived, latency_ms } = map?;
             if latencies_ms.is_empty()
                 && unrelated_pairs == 0
                 && let Some(doubt) = another_size(&optics, far.pixels.dim())
             {
                 context.progress.warn(&doubt.to_string());
             }
-            let arrived = Instant::now();
-            let Some(found) = measure(&mut depths, grey, context)? else {
+            let Some(found) = found else {
                 unrelated_pairs += 1;
                 continue;
             };
-            let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
             latencies_ms.push(latency_ms);
             seconds = at.as_secs_f64();
             context.progress.advance("pairs", latencies_ms.len(), None);
+            let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
             on_depth(LiveDepth { far: &far, near: &near, found: &found, pair_ms: 0.0, latency_ms }, &optics)?;
         }
         Ok::<_, WorkflowError>(())

@@ -61,8 +61,9 @@ use crate::{
 #[serde(default)]
 pub struct MarkersRequest {
     /// The recording: .c3d, .trc, .bvh, .skeleton (NTU RGB+D), .txt (20 or 25 Kinect joints a line), .csv with columns NAME_x,
-    /// NAME_y, NAME_z in mm or of the Kinect SDK, Vicon Nexus or OptiTrack Motive, .npz with joint positions of an SMPL body, or
-    /// keypoints: .json of OpenPose, COCO, HALPE, MMPose or MediaPipe, or a folder of such files, a frame each. 2-D keypoints have one view.
+    /// NAME_y, NAME_z in mm or of the Kinect SDK, Vicon Nexus or OptiTrack Motive, .tsv of Qualisys, .npz with joint positions of
+    /// an SMPL body, or keypoints: .json of OpenPose, COCO, HALPE, MMPose or MediaPipe, or a folder of such files, a frame each.
+    /// 2-D keypoints have one view.
     pub file: PathBuf,
     /// plug-in-gait (also CMU's 41 markers), vicon-53, opencap, thesis, bvh, kinect, keypoints, or a TOML file of `[[part]] name,
     /// markers, thickness_mm` [default: the one of these that fits best, which is reported].

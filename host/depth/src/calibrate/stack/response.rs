@@ -52,8 +52,9 @@ const MODEL_LIMITED: f64 = 0.5;
 const TOLERATED: f64 = 2.0;
 /// Largest accepted difference.
 const LARGEST_TOLERANCE: f64 = 0.15;
-/// Largest squared error, relative to its variance, that counts.
-const LARGEST_SQUARE: f64 = 100.0;
+/// Largest squared error, relative to its variance, that counts: larger ones are outliers. With them the tolerance of clear
+/// lenses hid relief.
+const LARGEST_SQUARE: f64 = 9.0;
 /// Improvement that justifies a lens with one more parameter.
 pub(super) const WORTH: f64 = 0.97;
 /// Part of the noise's variance that smoothing leaves: sum of the squared taps.

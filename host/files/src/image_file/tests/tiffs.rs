@@ -54,8 +54,9 @@ fn palettes_of_image_j_are_for_display_only() {
             assert_eq!(pixels.mapv(|v| (255.0 * v).round()), array![[7.0, 200.0]], "{program} {number}");
         }
     }
-    // Of a picture, in no order.
-    let leaping: Vec<u16> = (0..3 * 256_u32).map(|at| (at * 97 % 256 * 257) as u16).collect();
+    // Of a picture: in no order, each channel in another.
+    let leaping: Vec<u16> =
+        (0..3 * 256_u32).map(|at| (at * (97 + 2 * (at / 256)) % 256 * 257) as u16).collect();
     let colours = Page { texts: vec![(270, "ImageJ=1.54f\n".into())], ..page }.with(320, &leaping);
     assert!(decode_grey(&tiff(CLASSIC, &[colours])).unwrap().colour);
 }

@@ -1,27 +1,26 @@
 //! Tables with a row for each point: the frame or its time, perhaps the person, the point's name or number, and `x`, `y`, perhaps
-//! `z` and a confidence. They become tables with a row for each frame (and person) and columns `NAME_x`. Linear in the file.
+//! `z` and a confidence. They become tables with a row for each frame (and person) and columns `NAME_x`. In tables with a row for each
+//! person and points in space, people become prefixes. Linear in the file.
 
 use std::cmp::Ordering;
 use std::collections::{HashMap, HashSet};
 
 use csv::StringRecord;
 
-use super::{TIMES, check_width, coordinate, line};
+use super::{
+    LEAST_AXES, check_width,
+    columns::{CONFIDENCES, FRAMES, POINTS, TIMES, people, place},
+    coordinate, line, unseparated,
+};
 use crate::readers::{
-    keypoints::{
-        names,
-        table::{CONFIDENCES, FRAMES, PEOPLE, are_keypoints},
-    },
+    keypoints::{names, table::are_keypoints},
     recording::{RecordingError, number},
 };
 
-/// What columns of points' names are called, mostly with a word such as `_name` or `_id` after it.
-const POINTS: [&str; 8] = ["keypoint", "landmark", "bodypart", "joint", "marker", "point", "part", "node"];
+/// What may follow in the names of columns of points.
 const WORDS: [&str; 5] = ["name", "id", "idx", "index", "number"];
 /// Most cells of the wide table for each row; with more, most would be empty.
 const MOST_CELLS: usize = 20;
-/// Least columns `NAME_x` of a wide table; fewer may be those of a box.
-const LEAST_WIDE: usize = 3;
 
 struct Columns {
     point: usize,
@@ -34,6 +33,10 @@ struct Columns {
     person: Option<usize>,
     /// People of markers in space are prefixes of the names.
     are_prefixes: bool,
+    /// Name of rows without one; else these are ignored.
+    unnamed: Option<&'static str>,
+    /// What a row is of, also in the plural, and the character between its name and that of a field.
+    of: (&'static str, &'static str, char),
 }
 
 /// Rows of a frame and person with their points.
@@ -48,33 +51,81 @@ struct Group<'a> {
 pub fn wide(rows: Vec<StringRecord>) -> Result<Vec<StringRecord>, RecordingError> {
     let Some((header, below)) = rows.split_first() else { return Ok(rows) };
     let Some(columns) = columns(header, below) else { return Ok(rows) };
-    let (names, groups) = grouped(&columns, header, below)?;
+    table(&columns, header, below)
+}
+
+/// A table with a row for each person in a frame and points in space, with people as prefixes; `None` for one person.
+pub fn apart(
+    header: &StringRecord,
+    below: &[StringRecord],
+) -> Result<Option<Vec<StringRecord>>, RecordingError> {
+    let axes = header.iter().filter_map(|column| coordinate(column).or_else(|| unseparated(column)));
+    let depths = axes.filter(|(_, axis)| *axis == 2).count();
+    let Some(person) = people(header, below, false).filter(|_| depths >= LEAST_AXES) else { return Ok(None) };
+    let (frame, time) = (place(header, &FRAMES), place(header, &TIMES));
+    let is_named = |row: &&StringRecord| row.get(person).is_some_and(|cell| !cell.is_empty());
+    let named: Vec<&StringRecord> = below.iter().filter(is_named).collect();
+    let count = |at: usize| named.iter().filter_map(|row| row.get(at)).collect::<HashSet<&str>>().len();
+    // The number of a person alone may change, and recordings may follow each other.
+    let alone = frame.or(time).map_or(count(person) == named.len(), |at| {
+        let pairs: HashSet<_> = named.iter().map(|row| (row.get(at), row.get(person))).collect();
+        count(at) == named.len() || pairs.len() < named.len()
+    });
+    if count(person) < 2 || alone {
+        return Ok(None);
+    }
+    let is_field = |at: &usize| *at != person && Some(*at) != frame && Some(*at) != time;
+    let fields = (0..header.len()).filter(is_field).map(|at| (at, header[at].to_owned())).collect();
+    let columns = Columns {
+        point: person,
+        numbered: None,
+        fields,
+        frame,
+        time,
+        person: None,
+        are_prefixes: false,
+        unnamed: Some("unnamed"),
+        of: ("person", "people", ':'),
+    };
+    table(&columns, header, below).map(Some)
+}
+
+/// Refuses tables of which most cells would be empty.
+pub fn check_cells(rows: usize, of: &str, columns: usize, frames: usize) -> Result<(), RecordingError> {
+    if columns * frames <= MOST_CELLS * rows {
+        return Ok(());
+    }
+    let reason = format!(
+        "its {rows} rows hold {columns} different {of} in {frames} frames, expected most of the {of} in each frame"
+    );
+    Err(RecordingError::Kind { kind: "CSV", reason })
+}
+
+fn table(
+    columns: &Columns,
+    header: &StringRecord,
+    below: &[StringRecord],
+) -> Result<Vec<StringRecord>, RecordingError> {
+    let (names, groups) = grouped(columns, header, below)?;
+    let (of, many, separator) = columns.of;
     if names.is_empty() {
-        let reason = "it has no row of a point below its header".into();
+        let reason = format!("it has no row of a {of} below its header");
         return Err(RecordingError::Kind { kind: "CSV", reason });
     }
-    if names.len() * groups.len() > MOST_CELLS * below.len() {
-        let reason = format!(
-            "its {} rows hold {} different points in {} frames, expected most of the points in each frame",
-            below.len(),
-            names.len(),
-            groups.len()
-        );
-        return Err(RecordingError::Kind { kind: "CSV", reason });
-    }
+    check_cells(below.len(), many, names.len(), groups.len())?;
     let track = columns.person.filter(|_| !columns.are_prefixes);
-    let kept = [(track, "track"), (columns.time, "time")];
-    let kept: Vec<(usize, &str)> = kept.into_iter().filter_map(|(at, name)| Some((at?, name))).collect();
+    let kept: Vec<usize> = [track, columns.time].into_iter().flatten().collect();
     let mut all = StringRecord::from(vec!["frame"]);
-    kept.iter().for_each(|(_, name)| all.push_field(name));
+    // A name may state a unit, or whether people are meant.
+    kept.iter().for_each(|at| all.push_field(&header[*at]));
     for name in &names {
-        columns.fields.iter().for_each(|(_, field)| all.push_field(&format!("{name}_{field}")));
+        columns.fields.iter().for_each(|(_, field)| all.push_field(&format!("{name}{separator}{field}")));
     }
     let mut table = vec![all];
     for group in &groups {
         let mut row = StringRecord::from(vec![group.frame.as_str()]);
         row.set_position(group.first.position().cloned());
-        kept.iter().for_each(|(at, _)| row.push_field(&group.first[*at]));
+        kept.iter().for_each(|at| row.push_field(&group.first[*at]));
         for place in 0..names.len() {
             let own = group.rows.get(&place);
             columns.fields.iter().for_each(|(at, _)| row.push_field(own.map_or("", |own| &own[*at])));
@@ -85,12 +136,10 @@ pub fn wide(rows: Vec<StringRecord>) -> Result<Vec<StringRecord>, RecordingError
 }
 
 fn columns(header: &StringRecord, below: &[StringRecord]) -> Option<Columns> {
-    let is_of = |column: &str, known: &[&str]| known.iter().any(|name| column.eq_ignore_ascii_case(name));
-    let place = |known: &[&str]| header.iter().position(|column| is_of(column, known));
-    let axes = ["x", "y", "z"].map(|axis| (place(&[axis, format!("{axis}_coord").as_str()]), axis));
-    let sure = header.iter().position(|column| is_of(column, &CONFIDENCES));
+    let axes = ["x", "y", "z"].map(|axis| (place(header, &[axis, format!("{axis}_coord").as_str()]), axis));
+    let sure = place(header, &CONFIDENCES);
     let wide = header.iter().filter_map(coordinate).filter(|(_, axis)| *axis == 0).count();
-    if axes[0].0.is_none() || axes[1].0.is_none() || wide >= LEAST_WIDE {
+    if axes[0].0.is_none() || axes[1].0.is_none() || wide >= LEAST_AXES {
         return None;
     }
     let is_flat = axes[2].0.is_none();
@@ -113,17 +162,19 @@ fn columns(header: &StringRecord, below: &[StringRecord]) -> Option<Columns> {
         numbered,
         are_prefixes: !is_flat && numbered.is_none_or(|word| !are_keypoints(word, count, is_sure)),
         fields: fields.chain(sure).collect(),
-        frame: place(&FRAMES),
-        time: place(&TIMES),
-        person: place(&PEOPLE).filter(|at| {
+        frame: place(header, &FRAMES),
+        time: place(header, &TIMES),
+        person: people(header, below, true).filter(|at| {
             let people: HashSet<Option<&str>> = below.iter().map(|row| row.get(*at)).collect();
             people.len() > 1
         }),
+        unnamed: None,
+        of: ("point", "points", '_'),
     })
 }
 
 /// The word for points in the name of a column that tells them apart.
-fn point_column(column: &str) -> Option<&'static str> {
+pub fn point_column(column: &str) -> Option<&'static str> {
     let letters = column.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase());
     let simple: String = letters.collect();
     POINTS
@@ -150,10 +201,11 @@ fn grouped<'a>(
     for row in below {
         check_width(row, header)?;
         let person = columns.person.map_or("", |at| &row[at]);
-        let point = &row[columns.point];
-        if point.is_empty() {
-            continue;
-        }
+        let point = match (&row[columns.point], columns.unnamed) {
+            ("", None) => continue,
+            ("", Some(name)) => name,
+            (point, _) => point,
+        };
         let frame = match columns.frame.or(columns.time) {
             Some(at) => row[at].to_owned(),
             None => {
@@ -184,8 +236,8 @@ fn grouped<'a>(
         let group = &mut groups[group];
         if group.rows.insert(place, row).is_some() {
             let reason = format!(
-                "a second row of the point `{}` in frame {}, expected one: a column such as person_id tells people apart",
-                names[place], group.frame
+                "a second row of the {} `{}` in frame {}, expected one: a column such as person_id tells people apart",
+                columns.of.0, names[place], group.frame
             );
             return Err(RecordingError::Line { line: line(row), reason });
         }
@@ -196,7 +248,7 @@ fn grouped<'a>(
     let value = |group: &Group<'_>| number(&group.frame).filter(|value| value.is_finite());
     if groups.iter().all(|group| value(group).is_some()) {
         groups.sort_by(|a, b| value(a).partial_cmp(&value(b)).unwrap_or(Ordering::Equal));
-    } else {
+    } else if columns.frame.is_some() {
         groups.sort_by_cached_key(|group| names::split(&group.frame));
     }
     if columns.frame.is_none() {
@@ -210,8 +262,7 @@ fn grouped<'a>(
 }
 
 fn unordered(row: &StringRecord) -> RecordingError {
-    let reason =
-        "the rows do not repeat the same points, and no column numbers the frames: expected frame or time";
+    let reason = "the rows do not repeat the same points or people, and no column numbers the frames: expected frame or time";
     RecordingError::Line { line: line(row), reason: reason.into() }
 }
 
@@ -318,8 +369,10 @@ mod tests {
                 .map(|person| of(person, frame, name, &format!("{},{y}", x + 300.0 * person as f64)))
                 .join("\n")
         });
-        let found = read("frame,person_id,keypoint,x,y", &flat, Some(2)).expect("two people");
-        assert!(found.frames.len() == 2 && found.remarks().join("; ").contains("2 people"));
+        for column in ["person_id", "id"] {
+            let found = read(&format!("frame,{column},keypoint,x,y"), &flat, Some(2)).expect("two people");
+            assert!(found.frames.len() == 2 && found.remarks().join("; ").contains("2 people"));
+        }
         let in_space = rows(|frame, _, name, [x, y]| {
             let place = |person: usize| format!("{},{},{}", 10.0 * x, 2000 * person + 5, 1900.0 - 10.0 * y);
             [0, 1].map(|person| of(person, frame, name, &place(person))).join("\n")
@@ -333,6 +386,31 @@ mod tests {
         });
         let found = read("frame,person,marker,x,y,z", &numbered, None).expect("markers");
         assert_eq!((found.frames.len(), found.by_name(1)["2:marker_5"]), (2, [118.0, 50.0, 2000.0]));
+    }
+
+    #[test]
+    fn rows_of_people_in_space_are_kept_apart_and_a_number_that_changes_is_one_person() {
+        let row = |person: usize, frame: usize| {
+            let place =
+                |[x, y]: [f64; 2]| format!(",{},{},{}", 10.0 * x, 2000 * person + 5, 1900.0 - 10.0 * y);
+            format!("{frame},{person}{}", BODY.map(|(_, _, own)| place(own)).concat())
+        };
+        let names = BODY.map(|(_, name, _)| format!(",{name}_x,{name}_y,{name}_z")).concat();
+        let rows: Vec<String> = (0..6).map(|n| row(1 + n / 3, n % 3)).collect();
+        for column in ["person_id", "id"] {
+            let found = read(&format!("frame,{column}{names}"), &rows, Some(2)).expect("two people");
+            assert_eq!(found.frames.len(), 3);
+            assert_eq!(found.by_name(2)["left_knee"], [1090.0, 4005.0, 480.0]);
+            assert!(found.remarks().join("; ").contains("2 people"), "{column}");
+        }
+        let alone: Vec<String> = (0..6).map(|n| row(1 + n / 3, n)).collect();
+        let found = read(&format!("frame,track_id{names}"), &alone, None).expect("one person");
+        assert_eq!((found.frames.len(), found.by_name(5)["left_knee"][1]), (6, 4005.0));
+        let repeated =
+            read(&format!("frame,take{names}"), &rows, None).expect("one person").remarks().join("; ");
+        assert!(repeated.contains("6 rows share 3 frame numbers"), "{repeated}");
+        let error = read(&format!("take,track_id{names}"), &rows, None).expect_err("no frames").to_string();
+        assert!(error.starts_with("line 5: the rows do not repeat the same points or people"), "{error}");
     }
 
     #[test]
@@ -369,16 +447,6 @@ mod tests {
             let error = read("keypoint,x,y", &rows, None).expect_err("no order").to_string();
             assert!(error.starts_with(&format!("line {line}: the rows do not repeat the same")), "{error}");
         }
-    }
-
-    #[test]
-    fn a_wide_table_with_other_columns_stays_one() {
-        let names: String = BODY.iter().map(|(_, name, _)| format!(",{name}_x,{name}_y,{name}_z")).collect();
-        let place = |[x, y]: &[f64; 2]| format!(",{},5,{}", 10.0 * x, 1900.0 - 10.0 * y);
-        let places: String = BODY.iter().map(|(_, _, own)| place(own)).collect();
-        let rows = ["0,start", "1,walk"].map(|event| format!("{event},0.1,0.2{places}"));
-        let found = read(&format!("frame,marker,x,y{names}"), &rows, None).expect("markers");
-        assert_eq!(found.by_name(1)["left_knee"], [1090.0, 5.0, 480.0]);
     }
 
     #[test]

@@ -9,7 +9,10 @@ use super::{
     points::{Person, Raw},
     spatial,
 };
-use crate::{readers::recording::RecordingError, silhouette::aliases};
+use crate::{
+    readers::{people::prefixed, recording::RecordingError},
+    silhouette::aliases,
+};
 
 const KEYS: [&str; 3] = ["name", "part", "id"];
 /// Points of COCO, the usual layout of programs that leave points out.
@@ -119,7 +122,8 @@ fn by_number(labels: &[String], frames: &[Vec<Person>]) -> Option<Order> {
 }
 
 fn by_name(labels: &[String]) -> Option<Order> {
-    let known = aliases::keypoints(labels);
+    let with_prefixes = prefixed(labels);
+    let known = aliases::keypoints(with_prefixes.as_deref().unwrap_or(labels));
     let about = format!("{} of {} named points are keypoints", known.len(), labels.len());
     let places = |layout: &'static Layout| -> Option<HashMap<String, usize>> {
         let place = |(label, name): &(usize, String)| {

@@ -45,6 +45,11 @@ impl Raw {
         point.iter().all(|v| v.is_finite()).then_some(point)
     }
 
+    /// The third number of a point in a picture may be one.
+    fn confidence(&self, layout: &Layout, has_depth: bool) -> Option<f64> {
+        self.sure.or(self.third.filter(|_| !has_depth && !layout.has_picture_depth()))
+    }
+
     pub fn in_picture(&self) -> Option<Point3> {
         let zero = self.x == 0.0 && self.y == 0.0;
         // Not 0, 0, 0, which is a missing marker.
@@ -81,20 +86,36 @@ impl Person {
         self
     }
 
-    /// Orders the points; returns the number that are hidden for their low confidence.
-    pub fn placed(&mut self, layout: &Layout, has_depth: bool) -> usize {
+    /// Of the points in a layout.
+    pub fn confidences(&self, layout: &'static Layout, has_depth: bool) -> impl Iterator<Item = f64> {
+        self.raw.iter().filter_map(move |raw| raw.confidence(layout, has_depth))
+    }
+
+    /// Orders the points; returns the number that are hidden for their low confidence, of which `full` is the largest.
+    pub fn placed(&mut self, layout: &Layout, has_depth: bool, full: f64) -> usize {
         let mut unsure = 0;
         self.points = vec![None; NAMES.len()];
         for (place, raw) in layout.places().zip(&self.raw) {
             let Some(place) = place else { continue };
-            let third = raw.third.filter(|_| !has_depth && !layout.has_picture_depth());
-            let is_sure = raw.sure.or(third).unwrap_or(1.0) >= LEAST_CONFIDENCE;
+            let confidence = raw.confidence(layout, has_depth);
+            let is_sure = confidence.is_none_or(|confidence| confidence >= LEAST_CONFIDENCE * full);
             let point = if has_depth { raw.in_space() } else { raw.in_picture() };
             unsure += usize::from(point.is_some() && !is_sure);
             self.points[place] = point.filter(|_| is_sure);
         }
         unsure
     }
+}
+
+/// The largest possible confidence: 1, or that of percent, bytes or parts of 1000, if most values reach
+/// half of it. Scores of heat maps and logits may exceed 1, too.
+pub fn full_confidence(confidences: impl Iterator<Item = f64>) -> f64 {
+    const FULL: [f64; 3] = [100.0, 255.0, 1000.0];
+    let mut all: Vec<f64> = confidences.filter(|value| value.is_finite()).collect();
+    all.sort_unstable_by(f64::total_cmp);
+    // A few may be garbage.
+    let high = all.get(all.len() * 9 / 10).copied();
+    high.and_then(|high| FULL.into_iter().find(|full| (0.5 * full..=*full).contains(&high))).unwrap_or(1.0)
 }
 
 pub fn points(value: &Value, confidences: Option<&[Value]>) -> Option<Person> {
@@ -190,8 +211,9 @@ fn of_object(map: &Map<String, Value>) -> Option<Raw> {
     if has_key(map) {
         return None;
     }
-    let sure =
-        ["visibility", "score", "confidence", "c"].iter().find_map(|key| map.get(*key).and_then(number));
+    let sure = ["visibility", "score", "confidence", "c", "conf", "likelihood"]
+        .iter()
+        .find_map(|key| map.get(*key).and_then(number));
     // PoseNet nests the position.
     let place = map.get("position").and_then(Value::as_object).unwrap_or(map);
     let own = |key: &str| place.get(key).filter(|value| !is_nested(value));
@@ -218,4 +240,18 @@ fn has_key(map: &Map<String, Value>) -> bool {
 /// Whether a map holds people, a person or its points.
 pub fn is_frame(map: &Map<String, Value>) -> bool {
     has_key(map) || named(map).is_some()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scores_far_below_a_full_confidence_are_those_of_heat_maps() {
+        for (high, full) in
+            [(300.0, 1.0), (20.0, 1.0), (0.9, 1.0), (95.0, 100.0), (250.0, 255.0), (900.0, 1000.0)]
+        {
+            assert_eq!(full_confidence([high; 10].into_iter()), full, "{high}");
+        }
+    }
 }

@@ -15,21 +15,20 @@ use super::{
 };
 use crate::{
     readers::{
-        csv::{check_width, coordinate, line, markers_of},
+        csv::{
+            check_width,
+            columns::{CONFIDENCES, FRAMES, PEOPLE, frames, is_of, people},
+            coordinate, line, markers_of,
+        },
+        people::prefixed,
         recording::{Choices, Found, RecordingError, number},
         trc::point,
     },
     silhouette::{aliases, anatomy},
 };
 
-pub(in crate::readers) const CONFIDENCES: [&str; 5] =
-    ["likelihood", "score", "confidence", "conf", "visibility"];
 /// MocapNET writes x, y and the visibility before the name.
 const MOCAPNET: [&str; 3] = ["2DX_", "2DY_", "visible_"];
-pub(in crate::readers) const FRAMES: [&str; 6] =
-    ["frame_idx", "frameNumber", "frame", "frame_number", "frame_id", "frame_index"];
-pub(in crate::readers) const PEOPLE: [&str; 6] =
-    ["track", "track_id", "person", "person_id", "person_idx", "skeletonID"];
 
 struct Column {
     name: String,
@@ -48,6 +47,10 @@ pub fn read(
     // One kind counts: some tables have a score and a visibility of each point.
     let kind = columns.iter().filter_map(confidence).find_map(|(name, kind)| is_point(name).then_some(kind));
     let (mut points, mut has_z) = points_of(columns, |column| field(column, kind))?;
+    let names: Vec<String> = points.iter().map(|point| point.name.clone()).collect();
+    for (point, name) in points.iter_mut().zip(prefixed(&names).unwrap_or(names)) {
+        point.name = name;
+    }
     let mut numbers = Vec::new();
     if bodies(&points).is_empty() {
         numbers = numbers_of(&points).unwrap_or_default();
@@ -85,9 +88,11 @@ pub fn read(
         );
         return Err(RecordingError::Line { line: 1, reason });
     }
-    let is_of = |column: &str, known: &[&str]| known.iter().any(|name| column.eq_ignore_ascii_case(name));
-    let frame = columns.iter().position(|column| is_of(column, &FRAMES));
-    let track = columns.iter().position(|column| is_of(column, &PEOPLE));
+    let track = people(columns, rows, false);
+    let are_several = track.is_some_and(|at| rows.windows(2).any(|two| two[0].get(at) != two[1].get(at)));
+    let names = frames(columns, rows, are_several);
+    // Other numbers mostly count the people of one frame.
+    let track = track.filter(|at| names.is_none() || is_of(&columns[*at], &PEOPLE));
     let mut ids: HashMap<(&str, &str), i64> = HashMap::new();
     let mut frames: Vec<(String, Vec<Person>)> = Vec::new();
     for (index, row) in rows.iter().enumerate() {
@@ -109,12 +114,12 @@ pub fn read(
             }
             let next = ids.len() as i64;
             // Without numbers of frames each row is one.
-            let is_named = frame.is_none() || !(track.is_empty() && prefix.is_empty());
+            let is_named = names.is_none() || !(track.is_empty() && prefix.is_empty());
             let id = is_named.then(|| *ids.entry((track, *prefix)).or_insert(next));
             people.push(Person { labels: numbers.clone(), ..Person::named(raw, id) });
         }
-        let name = frame.map_or_else(|| index.to_string(), |column| cell(row, column).to_owned());
-        frames.push((name, people));
+        let name = names.as_ref().and_then(|names| names.get(index)).cloned();
+        frames.push((name.unwrap_or_else(|| index.to_string()), people));
     }
     if has_z && numbers.is_empty() && spatial::has_depth(frames.iter().flat_map(|(_, people)| people)) {
         return Ok(None);
@@ -122,7 +127,7 @@ pub fn read(
     if frames.is_empty() {
         return Err(RecordingError::Kind { kind: "CSV", reason: "it has no row below its header".into() });
     }
-    if frame.is_none() && ids.len() > bodies.len() {
+    if names.is_none() && ids.len() > bodies.len() {
         let reason = format!(
             "{} people have rows of their own, and no column numbers the frames: expected one of {}",
             ids.len(),
@@ -189,7 +194,7 @@ fn numbers_of(points: &[Column]) -> Option<Vec<String>> {
 /// Whether numbered points are keypoints by two of: their text, as many as a layout has, and no depth or a confidence. Others are
 /// markers.
 pub(in crate::readers) fn are_keypoints(text: &str, count: usize, is_sure: bool) -> bool {
-    let is_named = ["keypoint", "landmark"].iter().any(|word| text.contains(word));
+    let is_named = ["keypoint", "landmark", "kp"].iter().any(|word| text.contains(word));
     let is_layout = Layout::of(count).is_some();
     if is_sure { is_named || is_layout } else { is_named && is_layout }
 }
@@ -300,7 +305,8 @@ mod tests {
             assert!(found.rate_hz == 25.0 && remarks.contains("2 people"), "{} {remarks}", found.rate_hz);
             assert!(!remarks.contains("frame rate"), "{remarks}");
         }
-        let error = read(&format!("track_id,take,time{header}\n{rows}"), None).expect_err("no frames");
+        expect_person(&format!("track_id,take,time{header}\n{rows}"), 3);
+        let error = read(&format!("track_id,take,clock{header}\n{rows}"), None).expect_err("no frames");
         let error = error.to_string();
         assert!(
             error.starts_with("line 1") && error.contains("2 people") && error.contains("frame_idx"),

@@ -37,11 +37,38 @@ fn a_gap_is_named_by_the_slices_on_its_sides() {
 }
 
 #[test]
+fn positions_in_names_give_the_step() {
+    let folder = tempfile::tempdir().unwrap();
+    for number in -4..=4_i8 {
+        let name = format!("z{}um.png", 83 * i32::from(number));
+        std::fs::write(folder.path().join(name), number.to_le_bytes()).unwrap();
+    }
+    let stack = folder.path().to_path_buf();
+    let listed = Listed::of(&CalibrateStackRequest { stack, ..CalibrateStackRequest::default() }).unwrap();
+    assert!((listed.step_mm - 0.083).abs() < 1e-9 && listed.images[0].ends_with("z-332um.png"));
+    assert!(listed.remarks.iter().any(|remark| remark.contains("0.083 mm")), "{:?}", listed.remarks);
+}
+
+#[test]
+fn a_step_below_0_is_refused_with_the_remedy() {
+    let of = |step_mm| CalibrateStackRequest { step_mm: Some(step_mm), ..CalibrateStackRequest::default() };
+    let error = of(-0.083).check().unwrap_err();
+    assert!(error.is_usage() && error.to_string().contains("step-mm -0.083: expected a positive number"));
+    assert!(error.to_string().contains("--near-first"), "{error}");
+    for step_mm in [0.0, f64::NAN] {
+        assert!(!of(step_mm).check().unwrap_err().to_string().contains("--near-first"));
+    }
+    of(0.083).check().unwrap();
+}
+
+#[test]
 fn a_given_step_unlike_the_stated_one_has_a_remark() {
     assert_eq!(contradiction(0.1, None), None);
     assert_eq!(contradiction(0.1, Some(Ok(101.0))), None);
     let remark = contradiction(0.5, Some(Ok(100.0))).unwrap();
     assert!(remark.contains("0.1 mm") && remark.contains("--step-mm 0.5"), "{remark}");
+    let um_as_mm = contradiction(0.5, Some(Ok(0.5))).unwrap();
+    assert!(um_as_mm.contains("a step of 0.0005 mm") && agrees(0.0005, &Ok(0.5)), "{um_as_mm}");
     let uneven = even_step(&[0.0, 100.0, 230.0, 300.0], &CalibrateStackRequest::default());
     assert!(contradiction(0.1, Some(uneven)).unwrap().contains("uneven"));
 }

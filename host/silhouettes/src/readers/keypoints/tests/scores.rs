@@ -30,6 +30,22 @@ fn scores_above_one_are_not_depths_in_formats_that_define_them_as_scores() {
 }
 
 #[test]
+fn points_of_low_confidence_are_missing_in_percent_bytes_and_parts_of_1000() {
+    // The left wrist is a guess of the estimator; one value is garbage.
+    for full in [1.0, 100.0, 255.0, 1000.0] {
+        let mut points = person(layout(17), 100.0);
+        points.iter_mut().for_each(|point| point[2] = 0.9 * full);
+        (points[9][2], points[4][2]) = (0.05 * full, 5000.0);
+        let person =
+            format!(r#"[{{"image_id":0,"category_id":1,"keypoints":{},"score":0.9}}]"#, flat(&points));
+        let found = upright(&person, 1);
+        assert!(!found.by_name(0).contains_key("left wrist"), "{full}");
+        let remarks = found.remarks().join("; ");
+        assert_eq!(remarks.contains(&format!("parts of {full} (")), full > 1.0, "{remarks}");
+    }
+}
+
+#[test]
 fn triples_of_other_formats_may_be_coordinates() {
     let points = flat(&in_space(&layouts::HUMAN36M));
     upright_in_space(&format!(r#"[{{"keypoints":{points}}},{{"keypoints":{points}}}]"#));

@@ -1,0 +1,200 @@
+//! What columns of tables are called, other than those of points.
+
+use std::collections::HashSet;
+
+use csv::StringRecord;
+
+use crate::readers::recording::number;
+
+pub const CONFIDENCES: [&str; 9] =
+    ["likelihood", "score", "confidence", "conf", "visibility", "visible", "vis", "probability", "prob"];
+pub const FRAMES: [&str; 9] = [
+    "frame_idx",
+    "frameNumber",
+    "frame",
+    "frame_number",
+    "frame_id",
+    "frame_index",
+    "frame#",
+    "frame_no",
+    "frame_num",
+];
+pub const TIMES: [&str; 11] = [
+    "time",
+    "t",
+    "time (s)",
+    "time_s",
+    "time_sec",
+    "time_ms",
+    "timestamp",
+    "timestamp_s",
+    "timestamp_sec",
+    "timestamp_ms",
+    "timestamp_us",
+];
+/// What columns of points' names are called, mostly with a word such as `_name` or `_id` after it.
+pub const POINTS: [&str; 11] = [
+    "keypoint",
+    "kpt",
+    "kp",
+    "landmark",
+    "bodyparts",
+    "bodypart",
+    "joint",
+    "marker",
+    "point",
+    "part",
+    "node",
+];
+pub const PEOPLE: [&str; 6] = ["track", "track_id", "person", "person_id", "person_idx", "skeletonID"];
+/// Of people in some tables, and of rows or recordings in others.
+const PERHAPS_PEOPLE: [&str; 15] = [
+    "id",
+    "pid",
+    "player",
+    "player_id",
+    "subject",
+    "subject_id",
+    "instance",
+    "instance_id",
+    "object_id",
+    "tracking_id",
+    "body_id",
+    "bodyID",
+    "user_id",
+    "user-id",
+    "userID",
+];
+/// A recording has fewer people; more are those of a collection of recordings.
+const MOST_PEOPLE: usize = 16;
+/// Ends of names that state the unit of their times, and the units in a second.
+const STATED: [(&str, f64); 5] = [("_s", 1.0), ("(s)", 1.0), ("_sec", 1.0), ("_ms", 1e3), ("_us", 1e6)];
+/// Longest steps of times without a stated unit, and the units in a second: seconds, milliseconds, microseconds, 100 ns (Kinect).
+/// Longer steps are nanoseconds.
+const UNITS: [(f64, f64); 4] = [(2.0, 1.0), (2e3, 1e3), (2e5, 1e6), (2e6, 1e7)];
+
+pub fn is_of(column: &str, known: &[&str]) -> bool {
+    known.iter().any(|name| column.eq_ignore_ascii_case(name))
+}
+
+pub fn place(columns: &StringRecord, known: &[&str]) -> Option<usize> {
+    columns.iter().position(|column| is_of(column, known))
+}
+
+/// The column that tells people apart. One that may have another meaning has recurring values, several in a frame, each of several
+/// points.
+pub fn people(columns: &StringRecord, rows: &[StringRecord], are_points: bool) -> Option<usize> {
+    let frame = place(columns, &FRAMES).or_else(|| place(columns, &TIMES));
+    let is_one = |at: &usize| {
+        let pairs: HashSet<(&str, &str)> =
+            rows.iter().filter_map(|row| Some((row.get(*at)?, row.get(frame?)?))).collect();
+        let people: HashSet<&str> = pairs.iter().map(|(person, _)| *person).collect();
+        let frames: HashSet<&str> = pairs.iter().map(|(_, frame)| *frame).collect();
+        let recur = 2 * people.len() <= pairs.len() && frames.len() < pairs.len();
+        recur && people.len() <= MOST_PEOPLE && (!are_points || 2 * pairs.len() <= rows.len())
+    };
+    let perhaps = || {
+        let named = columns.iter().enumerate().filter(|(_, column)| is_of(column, &PERHAPS_PEOPLE));
+        named.map(|(at, _)| at).find(is_one)
+    };
+    place(columns, &PEOPLE).or_else(perhaps)
+}
+
+/// The names of the rows' frames; with people, the order of times if no column has names.
+pub fn frames(columns: &StringRecord, rows: &[StringRecord], has_people: bool) -> Option<Vec<String>> {
+    let cells = |at: usize| rows.iter().map(move |row| row.get(at).unwrap_or_default());
+    if let Some(at) = place(columns, &FRAMES) {
+        return Some(cells(at).map(str::to_owned).collect());
+    }
+    let at = place(columns, &TIMES).filter(|_| has_people)?;
+    let times: Vec<f64> =
+        cells(at).map(|cell| number(cell).filter(|time| time.is_finite())).collect::<Option<_>>()?;
+    let mut known = times.clone();
+    known.sort_unstable_by(f64::total_cmp);
+    known.dedup();
+    Some(times.iter().map(|time| known.partition_point(|other| other < time).to_string()).collect())
+}
+
+/// Frames per second by a column of times and the median of its steps, to three decimals.
+pub fn rate_hz(columns: &StringRecord, rows: &[StringRecord]) -> Option<f64> {
+    let column = place(columns, &TIMES)?;
+    let times: Vec<f64> = rows.iter().filter_map(|row| number(row.get(column)?)).collect();
+    // People of one frame have the same time.
+    let steps = times.windows(2).map(|two| two[1] - two[0]);
+    let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
+    steps.sort_unstable_by(f64::total_cmp);
+    let step = steps.get(steps.len() / 2).copied()?;
+    let name = columns.get(column)?.to_ascii_lowercase();
+    let per_second = match STATED.iter().find(|(end, _)| name.ends_with(*end)) {
+        Some((_, units)) => *units,
+        None => UNITS.iter().find(|(most, _)| step <= *most).map_or(1e9, |(_, units)| *units),
+    };
+    Some((1000.0 * per_second / step).round() / 1000.0).filter(|rate| rate.is_finite() && *rate > 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn records(text: &str) -> (StringRecord, Vec<StringRecord>) {
+        let mut rows = text.lines().map(|line| line.split(',').collect::<StringRecord>());
+        (rows.next().expect("a header"), rows.collect())
+    }
+
+    #[test]
+    fn times_are_read_in_the_unit_that_makes_their_rate_one_of_a_camera() {
+        for (column, step) in [
+            ("time_s", 0.04),
+            ("timestamp_ms", 40.0),
+            ("timestamp", 40_000.0),
+            ("Timestamp", 400_000.0),
+            ("timestamp", 40_000_000.0),
+            ("timestamp_us", 40_000.0),
+        ] {
+            let rows: String =
+                (0..4).map(|frame| format!("\n{}", 7.0 * step + step * f64::from(frame))).collect();
+            let (columns, rows) = records(&format!("{column}{rows}"));
+            assert_eq!(rate_hz(&columns, &rows), Some(25.0), "{column} {step}");
+        }
+    }
+
+    #[test]
+    fn a_unit_in_the_name_of_times_counts_more_than_their_range() {
+        for (text, rate) in [
+            ("time_ms\n0\n1\n2", Some(1000.0)),
+            ("timestamp_us\n0\n2000\n4000", Some(500.0)),
+            ("time_s\n0\n2.5\n5", Some(0.4)),
+            ("seconds\n0\n0\n1", None),
+        ] {
+            let (columns, rows) = records(text);
+            assert_eq!(rate_hz(&columns, &rows), rate, "{text}");
+        }
+    }
+
+    #[test]
+    fn more_numbers_than_people_in_a_recording_are_not_those_of_people() {
+        for (count, found) in [(16, Some(1)), (17, None)] {
+            let rows: String = (0..2 * count).map(|n| format!("\n{},{}", n / count, n % count)).collect();
+            let (columns, rows) = records(&format!("frame,id{rows}"));
+            assert_eq!(people(&columns, &rows, false), found);
+        }
+    }
+
+    #[test]
+    fn a_column_of_numbers_is_one_of_people_if_they_recur_and_share_frames() {
+        for (text, are_points, found) in [
+            ("frame,id\n0,1\n0,2\n1,1\n1,2", false, Some(1)),
+            ("frame,id\n0,1\n1,2\n2,3\n3,4", false, None),
+            ("frame,id\n0,1\n0,2\n1,3\n1,4", false, None),
+            ("frame,subject\n0,ann\n1,ann\n2,ann", false, None),
+            ("id,n\n1,1\n2,1\n1,2\n2,2", false, None),
+            ("frame,person_id\n0,1\n1,2", false, Some(1)),
+            // Numbers of points.
+            ("frame,id\n0,1\n0,2\n1,1\n1,2", true, None),
+            ("frame,id\n0,1\n0,1\n0,2\n0,2\n1,1\n1,1\n1,2\n1,2", true, Some(1)),
+        ] {
+            let (columns, rows) = records(text);
+            assert_eq!(people(&columns, &rows, are_points), found, "{text}");
+        }
+    }
+}
