@@ -33,6 +33,9 @@ pub struct Stage {
     pub residual: f64,
     /// Median over the target of [`unexplained`].
     pub usual_unexplained: f64,
+    /// Coarseness (logarithm, see `coarseness.rs`) that 90 % of the target's pixels have.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coarseness: Option<[f64; 2]>,
     /// Response to coarser texture.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coarser: Option<Coarser>,
@@ -82,6 +85,7 @@ impl Stage {
             window_tolerance: 0.0,
             residual: 0.0,
             usual_unexplained: 1.0,
+            coarseness: None,
             coarser: None,
         }
     }
@@ -125,6 +129,9 @@ impl Stage {
             if !(apart && all.clone().all(|v| v.is_finite() && v.abs() < 20.0)) {
                 return Some("coarser must have finite values and a larger coarseness than of_target");
             }
+        }
+        if self.coarseness.is_some_and(|[fine, coarse]| !(fine.is_finite() && coarse >= fine)) {
+            return Some("coarseness must be finite and rise");
         }
         if self.response.windows(2).any(|pair| pair[1] < pair[0]) {
             return Some("response must rise");

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
 use crate::common::{Texture, eight_bit, rig};
-use farnear_depth::measure::{DepthMethod, MeasureError, MeasureSettings, measure_pair};
+use farnear_depth::measure::{DepthMethod, Finding, MeasureError, MeasureSettings, measure_pair};
 use farnear_depth::operators::{Operators, Request, design};
 use farnear_depth::optics::{Optics, Stage};
 use farnear_depth::pipeline::{DepthMap, RunError, Settings, Warning, depth_from_pair};
@@ -206,4 +206,24 @@ fn a_learned_lens_averages_pixels_of_a_corrected_camera() {
     assert!(apart < 0.1, "{apart} mm");
     assert!(even.iter().filter(|depth| depth.is_finite()).count() > 8000);
     assert!(even.iter().zip(&corrected).all(|(a, b)| a.is_finite() == b.is_finite()));
+}
+
+#[test]
+fn a_texture_unlike_the_target_s_is_reported() {
+    let Bench { optics, pair, .. } = Bench::new(64);
+    for (coarseness, expected) in [
+        (None, None),
+        (Some([-2.0, 4.0]), None),
+        (Some([3.0, 4.0]), Some(false)),
+        (Some([-3.0, -2.0]), Some(true)),
+    ] {
+        let lens = optics.with_stage(Stage { coarseness, ..Stage::identity(1, 1) });
+        let settings = MeasureSettings::default();
+        let found = measure_pair(pair.clone(), &lens, DepthMethod::Whitened, None, &settings).unwrap();
+        let is_coarser = found.findings.iter().find_map(|finding| match finding {
+            Finding::OtherTexture { is_coarser } => Some(*is_coarser),
+            _ => None,
+        });
+        assert_eq!(is_coarser, expected, "{coarseness:?}");
+    }
 }

@@ -206,6 +206,7 @@ pub(super) fn finish(
         response: curve.response,
         residual: high,
         usual_unexplained: usual(high),
+        coarseness: usual_coarseness(samples),
         coarser,
         ..*identity
     };
@@ -230,6 +231,15 @@ pub(super) fn finish(
         by_depth,
     };
     Some((stage, held_out))
+}
+
+/// The coarseness of the target, without a twentieth of its pixels at either end.
+fn usual_coarseness(samples: &Samples) -> Option<[f64; 2]> {
+    let of_target = samples.of.iter().filter(|s| s.original).map(|s| s.coarseness);
+    let mut known: Vec<f64> = of_target.filter(|coarseness| coarseness.is_finite()).collect();
+    known.sort_unstable_by(f64::total_cmp);
+    let cut = known.len() / 20;
+    Some([*known.get(cut)?, *known.get(known.len() - 1 - cut)?])
 }
 
 fn by_depth(judged: &[Judged], predicted: impl Fn(&Judged) -> f64, half_mm: f64) -> Vec<AtDepth> {
