@@ -63,9 +63,8 @@ pub fn evened(frames: &[Array2<f32>]) -> Cow<'_, [Array2<f32>]> {
     frames.iter().zip(gains).map(|(frame, gain)| frame / gain as f32).collect::<Vec<_>>().into()
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(1.0)
+fn median(values: Vec<f64>) -> f64 {
+    crate::median::median(values, f64::total_cmp).unwrap_or(1.0)
 }
 
 #[cfg(test)]

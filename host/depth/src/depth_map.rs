@@ -55,6 +55,11 @@ pub enum Warning {
     },
     /// The images seem to be swapped, judged by the scene, because swapping only negates alpha; planes never warn.
     LooksSwapped(SwapEvidence),
+    /// The texture is unlike that of the target from which the lens was learned.
+    OtherTexture {
+        /// Coarser, or finer.
+        is_coarser: bool,
+    },
 }
 
 /// Evidence for a swapped pair.
@@ -79,6 +84,12 @@ impl fmt::Display for Warning {
             Self::PsfMismatch { operators, optics } => write!(
                 f,
                 "the operators were designed for the PSF {operators}, the optics have {optics}: expect errors of millimetres"
+            ),
+            Self::OtherTexture { is_coarser } => write!(
+                f,
+                "most of the texture is {} than that of the target of calibrate stack: depth may be off by some percent of the range, \
+                 beyond its deviation; calibrate on a target like the object",
+                if *is_coarser { "coarser" } else { "finer" }
             ),
             Self::LooksSwapped(evidence) => {
                 write!(f, "the pair looks swapped: ")?;

@@ -20,6 +20,7 @@ pub mod fourier;
 pub mod hankel;
 pub mod kernel;
 pub mod measure;
+mod median;
 pub mod metrics;
 pub mod mosaic;
 pub mod normalised_ratio;

@@ -12,6 +12,7 @@ use crate::baselines::{self, BaselineError};
 use crate::coarseness::coarseness;
 use crate::depth_map::{DepthMap, Warning};
 use crate::fill;
+use crate::median::median;
 use crate::mosaic::is_mosaic;
 use crate::operators::{DesignError, Operators};
 use crate::optics::{Optics, Stage};
@@ -208,7 +209,6 @@ pub(crate) fn measure_after(
     let (mut map, estimate) = measure(&prepared, white, optics, method, settings)?;
     let mut findings = findings(&map, &prepared, &estimate, optics);
     findings.extend(is_mosaic.then_some(Finding::Mosaic));
-    findings.extend(optics.stage().and_then(|stage| other_texture(&prepared, stage)));
     let (left_over, excess) = (estimate.left_over, estimate.excess);
     let judging = ValiditySettings { least_confidence: settings.least_confidence, filled: settings.run.fill };
     let validity = assess(&mut map, &prepared, estimate, optics, &judging);
@@ -260,11 +260,11 @@ pub(crate) fn measure(
     }
     let run = |side: usize| Settings { smoothing_px: side, ..settings.run };
     // The map first: validity needs no depth of its own, and maps are large.
-    let (map, mut judging) = match (method, settings.window) {
+    let (mut map, mut estimate) = match (method, settings.window) {
         (DepthMethod::Whitened, _) => {
-            let mut judging = estimate(far, near, white, optics, &of_windows)?;
-            let depth_mm = std::mem::take(&mut judging.depth_mm);
-            (of_estimate(depth_mm, &judging.deviation_mm, prepared, white, optics, settings), judging)
+            let mut found = estimate(far, near, white, optics, &of_windows)?;
+            let depth_mm = std::mem::take(&mut found.depth_mm);
+            (of_estimate(depth_mm, &found.deviation_mm, prepared, white, optics, settings), found)
         }
         (_, Window::Adaptive) => return Err(MeasureError::FixedWindow),
         (method, Window::Fixed(side)) => {
@@ -285,50 +285,44 @@ pub(crate) fn measure(
         DepthMethod::Rational(_) => RATIONAL_OVER_WHITENED,
         DepthMethod::Baseline(_) => BASELINE_OVER_WHITENED,
     };
-    let noise = (of_residual(judging.excess * of_noise) / of_noise) as f32;
+    let noise = (of_residual(estimate.excess * of_noise) / of_noise) as f32;
     let of_deviation = noisier * noise.sqrt();
     if of_deviation != 1.0 {
-        judging.deviation_mm.par_mapv_inplace(|deviation| deviation * of_deviation);
+        estimate.deviation_mm.par_mapv_inplace(|deviation| deviation * of_deviation);
     }
     if noise != 1.0 {
-        judging.misfit.par_mapv_inplace(|misfit| misfit / noise);
+        estimate.misfit.par_mapv_inplace(|misfit| misfit / noise);
     }
     // The border has the depth, so also the deviation and misfit, of the pixels next to it.
     let border = match method {
         DepthMethod::Rational(operators) => operators.kernel_size().max(white.reach_px() + 1),
         _ => white.reach_px() + 1,
     };
-    for map in [&mut judging.deviation_mm, &mut judging.misfit] {
+    for map in [&mut estimate.deviation_mm, &mut estimate.misfit] {
         extend_border(map, border);
     }
-    let mut map = map;
     if let Some(aligned) = prepared.report.aligned {
         undo_scaled_blur(&mut map.depth_mm, aligned.magnification, optics);
         if optics.stage().is_none() {
             let moments = (SCALED_BLUR_ERROR * (1.0 - aligned.magnification.powi(-2)).abs()) as f32;
             let of_model = moments * optics.depth_per_alpha_mm(0.0).abs() as f32;
             let of_model = of_model * of_model;
-            judging.deviation_mm.par_mapv_inplace(|deviation| (deviation * deviation + of_model).sqrt());
+            estimate.deviation_mm.par_mapv_inplace(|deviation| (deviation * deviation + of_model).sqrt());
         }
     }
-    let mut estimate = judging;
     if let (DepthMethod::Whitened, Some(stage)) = (method, optics.stage()) {
-        respond([&mut map.depth_mm, &mut estimate.deviation_mm], prepared, stage, optics);
+        let warning = respond([&mut map.depth_mm, &mut estimate.deviation_mm], prepared, stage, optics);
+        map.warnings.extend(warning);
     }
     Ok((map, estimate))
 }
 
-/// Whether the texture of most pixels is unlike that of the target.
-fn other_texture(pair: &Prepared, stage: &Stage) -> Option<Finding> {
-    let [fine, coarse] = stage.coarseness?;
-    let mut known: Vec<f32> = coarseness(pair).into_iter().filter(|value| value.is_finite()).collect();
-    if known.is_empty() {
-        return None;
-    }
-    let middle = known.len() / 2;
-    let median = f64::from(*known.select_nth_unstable_by(middle, f32::total_cmp).1);
-    let usual = fine - OTHER_TEXTURE..=coarse + OTHER_TEXTURE;
-    (!usual.contains(&median)).then_some(Finding::OtherTexture { is_coarser: median > coarse })
+/// Whether the texture of most pixels is unlike the learned ones, from `low` to `high`; not if noise hides it everywhere.
+fn other_texture(coarseness: Array2<f32>, [low, high]: [f64; 2]) -> Option<Warning> {
+    let known = coarseness.into_iter().filter(|value| value.is_finite()).collect();
+    let median = f64::from(median(known, f32::total_cmp)?);
+    let is_usual = (low - OTHER_TEXTURE..=high + OTHER_TEXTURE).contains(&median);
+    (!is_usual).then_some(Warning::OtherTexture { is_coarser: median > high })
 }
 
 /// Part of the noise of a pair that its residual shows. That noise contains what fine texture the blur leaves; the residual of the
@@ -338,8 +332,14 @@ fn of_residual(excess: f64) -> f64 {
 }
 
 /// Applies the stage's response and scales the deviation; unlearned depths move out of the valid range.
-fn respond([depth_mm, deviation_mm]: [&mut Array2<f32>; 2], pair: &Prepared, stage: &Stage, optics: &Optics) {
-    let coarseness = stage.coarser.map(|_| coarseness(pair));
+fn respond(
+    [depth_mm, deviation_mm]: [&mut Array2<f32>; 2],
+    pair: &Prepared,
+    stage: &Stage,
+    optics: &Optics,
+) -> Option<Warning> {
+    let is_used = stage.coarser.is_some() || stage.coarseness.is_some();
+    let coarseness = is_used.then(|| coarseness(pair));
     let per_alpha_mm = optics.depth_per_alpha_mm(0.0).abs() as f32;
     Zip::indexed(depth_mm).and(deviation_mm).par_for_each(|at, depth, deviation| {
         let measured = optics.alpha(f64::from(*depth));
@@ -355,6 +355,9 @@ fn respond([depth_mm, deviation_mm]: [&mut Array2<f32>; 2], pair: &Prepared, sta
             None => {}
         }
     });
+    let [low, high] = stage.coarseness?;
+    let coarsest = stage.coarser.iter().flat_map(|coarser| coarser.coarseness);
+    other_texture(coarseness?, [low, coarsest.fold(high, f64::max)])
 }
 
 /// The image with `bin` x `bin` pixels averaged into one; surplus pixels at the right and lower border are dropped.

@@ -94,10 +94,7 @@ fn amplitudes(
 /// Median of the finite values; 0 without any.
 fn median(mut values: Vec<f64>) -> f64 {
     values.retain(|value| value.is_finite());
-    match values.len() / 2 {
-        0 => 0.0,
-        middle => *values.select_nth_unstable_by(middle, f64::total_cmp).1,
-    }
+    crate::median::median(values, f64::total_cmp).unwrap_or(0.0)
 }
 
 #[cfg(test)]

@@ -136,6 +136,7 @@ export function make(host, remember) {
     const loading = ++show.loading;
     select(name);
     remember(name);
+    const replaced = [];
     try {
       const { capture } = await get(`/api/captures/${encodeURIComponent(name)}`);
       const names = Object.keys(FILES).filter((layer) => capture.files.includes(FILES[layer]));
@@ -149,16 +150,21 @@ export function make(host, remember) {
       for (const part of [first, names.filter((layer) => !first.includes(layer))]) {
         const loaded = await Promise.all(part.map((layer) => load(`/api/captures/${encodeURIComponent(name)}/files/${FILES[layer]}`)));
         if (loading !== show.loading) return;
-        // What is loaded again stays on screen, and its buttons in use, until then.
+        // A capture that is loaded again keeps its maps on screen and its buttons in use until then.
         if (part === first) replace(show.of === name ? Object.fromEntries(names.filter((layer) => show.maps[layer]).map((layer) => [layer, show.maps[layer]])) : {});
         part.forEach((layer, at) => { show.maps[layer] = loaded[at]; });
+        replaced.push(...part);
         await refresh();
       }
       await list();
     } catch (error) {
       if (loading !== show.loading) return;
       notice(error.message, "error", error.hint);
-      if (show.of === name) return;
+      if (show.of === name) {
+        // Maps of before do not stay next to new ones.
+        if (replaced.length) show.maps = Object.fromEntries(replaced.map((layer) => [layer, show.maps[layer]]));
+        return void refresh();
+      }
       // The picture of the capture before does not stay under this name.
       show.capture = null;
       replace({});

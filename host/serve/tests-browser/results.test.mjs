@@ -320,5 +320,11 @@ test("layers stay in use while the files of the shown capture are loaded again",
   await reason.click();
   await release();
   await page.locator(".reasons span", { hasText: "%" }).first().waitFor();
+  await page.unroute("**/files/reason.png");
+  // Reasons of the map before do not stay next to a new map.
+  await page.route("**/files/reason.png", (route) => route.abort());
+  await page.locator("button[data-layer=depth]").click();
+  await page.locator("#view-depth").getByRole("button", { name: "Compute depth" }).click();
+  await page.locator("button[data-layer=reason]:disabled").waitFor();
   await page.context().close();
 });

@@ -287,7 +287,7 @@ mod tests {
             let heard = Heard::default();
             let request = CalibrateCameraRequest { flat, dark, out: self.path("out") };
             let found = calibrate(&request, &heard.context());
-            (found, heard.said().into_iter().filter(|line| line.starts_with("warning: ")).collect())
+            (found, heard.warnings())
         }
 
         fn refused(&self, flat: &[&PathBuf], dark: &[&PathBuf], phrases: [&str; 3]) {

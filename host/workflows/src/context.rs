@@ -132,10 +132,13 @@ impl Context<'static> {
     }
 }
 
-/// Records what is reported.
+/// Records reports.
 #[cfg(test)]
 #[derive(Default)]
-pub(crate) struct Heard(Mutex<Vec<String>>);
+pub(crate) struct Heard {
+    said: Mutex<Vec<String>>,
+    warnings: Mutex<Vec<String>>,
+}
 
 #[cfg(test)]
 impl Heard {
@@ -144,14 +147,23 @@ impl Heard {
     }
 
     pub fn said(&self) -> Vec<String> {
-        self.0.lock().unwrap().clone()
+        self.said.lock().unwrap().clone()
+    }
+
+    pub fn warnings(&self) -> Vec<String> {
+        self.warnings.lock().unwrap().clone()
     }
 }
 
 #[cfg(test)]
 impl Progress for Heard {
     fn info(&self, what: &str) {
-        self.0.lock().unwrap().push(what.into());
+        self.said.lock().unwrap().push(what.into());
+    }
+
+    fn warn(&self, what: &str) {
+        self.info(&format!("warning: {what}"));
+        self.warnings.lock().unwrap().push(what.into());
     }
 }
 

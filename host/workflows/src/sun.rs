@@ -39,10 +39,10 @@ impl Moment {
 #[serde(default)]
 pub struct PlaceAndTime {
     /// Latitude in degrees, north positive.
-    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG", allow_negative_numbers = true))]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG"))]
     pub lat: f64,
     /// Longitude in degrees, east positive.
-    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG", allow_negative_numbers = true))]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG"))]
     pub lon: f64,
     /// Time with its zone (RFC 3339), such as 2014-06-23T12:30:00+01:00.
     #[cfg_attr(feature = "clap", arg(long, value_name = "RFC3339"))]

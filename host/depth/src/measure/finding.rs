@@ -43,11 +43,6 @@ pub enum Finding {
         /// Largest blur radius, px.
         max_blur_px: f64,
     },
-    /// The texture is unlike that of the target from which the lens was learned.
-    OtherTexture {
-        /// Coarser, or finer.
-        is_coarser: bool,
-    },
     /// Nothing rises above the noise.
     NothingSharp,
     /// Bands of brightness were evened out.
@@ -73,12 +68,6 @@ impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Run(text) | Self::SwappedByScene(text) => f.write_str(text),
-            Self::OtherTexture { is_coarser } => write!(
-                f,
-                "most of the texture is {} than that of the target of calibrate stack: depth may be off by some percent of the range, \
-                 beyond its deviation; calibrate on a target like the object",
-                if *is_coarser { "coarser" } else { "finer" }
-            ),
             Self::NoDepth => f.write_str(
                 "no pixel has a depth: are the optics those of these images, and do both show one textured object within the working \
                  range?",

@@ -293,9 +293,7 @@ fn step_from(middle: f32, exposures: &[Array2<f32>]) -> f32 {
 }
 
 fn median(values: impl Iterator<Item = f32>) -> f32 {
-    let mut values: Vec<f32> = values.collect();
-    let middle = values.len() / 2;
-    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f32::total_cmp).1 }
+    crate::median::median(values.collect(), f32::total_cmp).unwrap_or(0.0)
 }
 
 #[cfg(test)]

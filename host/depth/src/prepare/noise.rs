@@ -9,6 +9,7 @@ use ndarray::ArrayView2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use crate::median::median;
 use crate::simd::{self, Backend};
 
 const BLOCK_PX: usize = 16;
@@ -96,10 +97,9 @@ pub fn of_pair(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Option<PairNoise>
         return None;
     }
     blocks.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
+    // There are blocks.
     let median = |part: &[[f64; 2]], which: usize| {
-        let mut values: Vec<f64> = part.iter().map(|block| block[which]).collect();
-        values.sort_unstable_by(f64::total_cmp);
-        values[values.len() / 2]
+        median(part.iter().map(|block| block[which]).collect(), f64::total_cmp).unwrap_or_default()
     };
     let mean_variance = median(&blocks, 1);
     // Medians of the darkest and of the brightest quarter determine the line.

@@ -123,9 +123,12 @@ impl Series {
 pub fn positions_in_names(images: &[PathBuf]) -> Option<Vec<f64>> {
     let names: Vec<Name> = images.iter().map(|path| Name::of(path)).collect();
     let after = &names.first()?.texts[last_varying(&names)? + 1];
-    let unit = after.split(|c: char| !c.is_alphabetic()).find(|word| !word.is_empty())?;
-    let um = unit_um(unit).filter(|um| [1e-3, 1.0, 1e3].contains(um))?;
+    let um = unit_um(first_word(after)).filter(|um| [1e-3, 1.0, 1e3].contains(um))?;
     order::numbers(images).into_iter().map(|number| Some(number? * um)).collect()
+}
+
+fn first_word(text: &str) -> &str {
+    text.split(|c: char| !c.is_alphabetic()).find(|word| !word.is_empty()).unwrap_or_default()
 }
 
 fn file(path: &std::path::Path) -> String {
@@ -149,8 +152,7 @@ fn units<'a>(names: &'a [Name], of_pattern: &[Name]) -> Vec<&'a str> {
     let mut units: Vec<(f64, &str)> = Vec::new();
     for name in names.iter().filter(|name| name.texts.starts_with(&texts[..=column])) {
         let after = name.texts.get(column + 1).map_or("", String::as_str);
-        let word = after.split(|c: char| !c.is_alphabetic()).find(|word| !word.is_empty());
-        let unit = word.unwrap_or_default();
+        let unit = first_word(after);
         if let Some(um) = unit_um(unit)
             && units.iter().all(|(other, _)| *other != um)
         {
@@ -209,7 +211,7 @@ impl std::fmt::Display for Field {
     }
 }
 
-/// Numbers that differ, without those that another one determines. None if one tells all images apart.
+/// Numbers that some names share, without those that another one of these determines.
 fn fields(names: &[Name]) -> Vec<Field> {
     let all: Vec<Field> = (0..names[0].numbers.len()).map(|column| field(names, column)).collect();
     let mut fields: Vec<Field> = Vec::new();

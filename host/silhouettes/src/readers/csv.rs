@@ -6,6 +6,8 @@ pub(super) mod columns;
 mod long;
 mod melted;
 mod qualisys;
+#[cfg(test)]
+pub(super) mod sample;
 
 use std::collections::{HashMap, HashSet};
 

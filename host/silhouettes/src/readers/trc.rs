@@ -158,12 +158,13 @@ fn rows(
     Ok(frames)
 }
 
+pub(super) fn is_hidden(cell: &str) -> bool {
+    cell.is_empty() || ["nan", "na", "n/a", "null", "-"].iter().any(|word| cell.eq_ignore_ascii_case(word))
+}
+
 /// Three cells; an empty or invalid one is a hidden marker.
 pub(super) fn point(cells: [&str; 3], line: usize) -> Result<Option<Point3>, RecordingError> {
-    if cells.iter().any(|cell| {
-        cell.is_empty()
-            || ["nan", "na", "n/a", "null", "-"].iter().any(|word| cell.eq_ignore_ascii_case(word))
-    }) {
+    if cells.into_iter().any(is_hidden) {
         return Ok(None);
     }
     let mut point = [0.0; 3];

@@ -61,7 +61,7 @@ pub struct CalibrateStackRequest {
     /// the rig's record.
     #[cfg_attr(feature = "clap", arg(long, value_name = "MM"))]
     pub step_mm: Option<f64>,
-    /// Side of a pixel at the target, in um [default: that of the TIFF's metadata, if the step is theirs, too]. Without it slopes
+    /// Side of a pixel at the target, in um [default: that of the TIFF's metadata, if the files state the step, too]. Without it slopes
     /// and meshes are per pixel.
     #[cfg_attr(feature = "clap", arg(long, value_name = "UM"))]
     pub object_pixel_um: Option<f64>,
@@ -218,9 +218,6 @@ pub fn calibrate(request: &CalibrateStackRequest, context: &Context<'_>) -> Resu
     let found = calibrate_stack(&slices, &settings, &proceed);
     context.cancel.check("calibrating the lens")?;
     let found = found.map_err(|error| match error {
-        StackError::NotPositive { name, value } => {
-            WorkflowError::parameter(name, value, "expected a positive number")
-        }
         StackError::OutOfRange { name, value, expected } => {
             WorkflowError::parameter(name, value, format!("expected {expected}"))
         }
@@ -272,7 +269,7 @@ impl Listed {
                     .collect();
                 order.sort_by(|a, b| a.0.total_cmp(&b.0));
                 let (positions, images): (Vec<f64>, Vec<PathBuf>) = order.into_iter().unzip();
-                let step_mm = even_step(&positions, request)?;
+                let step_mm = even_step(&positions, request, "")?;
                 Self { images, step_mm, lens: Some(lens), object_pixel_um: None, remarks: Vec::new() }
             }
             None => {
@@ -287,11 +284,13 @@ impl Listed {
                     );
                     return Err(WorkflowError::parameter("stack", request.stack.display(), expected));
                 }
-                let step_mm = match (request.step_mm, positions_um) {
+                let are_named = positions_um.is_none();
+                let positions_um = positions_um.or_else(|| stack::positions_in_names(&images));
+                let rounded = "; if the positions are rounded, give --step-mm";
+                let remedy = if request.step_mm.is_none() { rounded } else { "" };
+                let stated = positions_um.map(|positions| even_step(&positions, request, remedy));
+                let step_mm = match (request.step_mm, stated) {
                     (Some(step_mm), stated) => {
-                        let stated = stated
-                            .or_else(|| stack::positions_in_names(&images))
-                            .map(|positions| even_step(&positions, request));
                         // The metadata's pixel is in um, --step-mm may be in degrees or volts.
                         if !stated.as_ref().is_some_and(|stated| agrees(step_mm, stated)) {
                             object_pixel_um = None;
@@ -299,26 +298,18 @@ impl Listed {
                         remarks.extend(contradiction(step_mm, stated));
                         step_mm
                     }
-                    (None, Some(positions)) => even_step(&positions, request)? * 1e-3,
-                    (None, None) => {
-                        let Some(positions) = stack::positions_in_names(&images) else {
-                            let expected = "the distance between neighbouring slices: neither metadata nor names such as z-83um.png \
-                                            state it";
-                            return Err(WorkflowError::parameter("step-mm", "(none)", expected));
-                        };
-                        // Positions in names may be rounded.
-                        let step_mm = 1e-3
-                            * even_step(&positions, request).map_err(|error| {
-                                let expected = format!(
-                                    "the distance between neighbouring slices, for by their names: {error}"
-                                );
-                                WorkflowError::parameter("step-mm", "(none)", expected)
-                            })?;
+                    (None, Some(stated)) => {
+                        let step_mm = stated? * 1e-3;
                         let read = rounded_for(step_mm, step_mm, 6);
-                        remarks.push(format!(
-                            "the names of the slices state a step of {read} mm, which is used"
-                        ));
+                        let remark =
+                            || format!("the names of the slices state a step of {read} mm, which is used");
+                        remarks.extend(are_named.then(remark));
                         step_mm
+                    }
+                    (None, None) => {
+                        let expected = "the distance between neighbouring slices: neither metadata nor names such as z-83um.png \
+                                        state it";
+                        return Err(WorkflowError::parameter("step-mm", "(none)", expected));
                     }
                 };
                 if request.near_first {
@@ -334,7 +325,7 @@ fn agrees(step_mm: f64, stated_um: &Result<f64>) -> bool {
     stated_um.as_ref().is_ok_and(|step_um| (step_um * 1e-3 - step_mm).abs() <= SAME_STEP * step_mm)
 }
 
-/// What the files' metadata state otherwise than `--step-mm`.
+/// What the files state otherwise than `--step-mm`.
 fn contradiction(step_mm: f64, stated: Option<Result<f64>>) -> Option<String> {
     let stated = match stated.filter(|stated| !agrees(step_mm, stated))? {
         Ok(step_um) => format!("a step of {} mm", rounded_for(step_um * 1e-3, step_um * 1e-3, 4)),
@@ -344,7 +335,7 @@ fn contradiction(step_mm: f64, stated: Option<Result<f64>>) -> Option<String> {
 }
 
 /// Mean step between positions that are in order, above 0.
-fn even_step(positions: &[f64], request: &CalibrateStackRequest) -> Result<f64> {
+fn even_step(positions: &[f64], request: &CalibrateStackRequest, remedy: &str) -> Result<f64> {
     let steps: Vec<f64> = positions.windows(2).map(|two| two[1] - two[0]).collect();
     let mut sorted = steps.clone();
     sorted.sort_unstable_by(f64::total_cmp);
@@ -354,8 +345,9 @@ fn even_step(positions: &[f64], request: &CalibrateStackRequest) -> Result<f64> 
         Some((index, step)) => {
             let (from, to) = (index + 1, index + 2);
             let [step, usual] = [*step, usual].map(|step| rounded_for(usual, step, 4));
-            let expected =
-                format!("expected even steps, but slices {from} and {to} are {step} apart, {usual} is usual");
+            let expected = format!(
+                "expected even steps, but slices {from} and {to} are {step} apart, {usual} is usual{remedy}"
+            );
             Err(WorkflowError::parameter("stack", request.stack.display(), expected))
         }
         None => Ok(rounded((steps.iter().sum::<f64>() / steps.len().max(1) as f64).abs(), 9)),

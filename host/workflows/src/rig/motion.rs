@@ -78,10 +78,7 @@ pub struct MoveRequest {
     #[cfg_attr(feature = "clap", arg(long, value_name = "AXIS", required = true))]
     pub axis: Vec<AxisName>,
     /// The position in micrometres, positive = sensor and lens away from each other; 0 = home switch. The piezo moves within fine_min_nm and fine_max_nm; `farnear rig reset` relaxes it.
-    #[cfg_attr(
-        feature = "clap",
-        arg(long, value_name = "UM", allow_negative_numbers = true, required = true)
-    )]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "UM", required = true))]
     pub to_um: Vec<f64>,
     /// Home axes first that are not homed.
     #[cfg_attr(feature = "clap", arg(long))]

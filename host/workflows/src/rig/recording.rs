@@ -367,6 +367,46 @@ mod tests {
         assert!(Recording::open(&path).err().expect("refused").to_string().contains("FNPAIRS1"));
     }
 
+    /// A texture, and a blurred one.
+    fn textured() -> [Image; 2] {
+        let code = |y: usize, x: usize| ((y * 7919 + x * 104_729 + x * y * 31) % 3001) as u16 + 500;
+        let mean =
+            |y: usize, x: usize| (0..9).map(|i| u32::from(code(y + i / 3, x + i % 3))).sum::<u32>() / 9;
+        let far = Array2::from_shape_fn((48, 64), |(y, x)| code(y + 1, x + 1));
+        let near = Array2::from_shape_fn((48, 64), |(y, x)| mean(y, x) as u16);
+        [far, near].map(|pixels| Image::new(pixels, 12))
+    }
+
+    #[test]
+    fn a_recording_is_played_in_its_order_and_ends_with_the_first_error() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.pairs");
+        let mut recorder = Recorder::begin(&path, &optics()).expect("begins");
+        let [far, near] = textured();
+        for number in 0..4 {
+            let mut far = far.clone();
+            far.pixels[(0, 0)] = number;
+            recorder.add(&far, &near).expect("room");
+        }
+        recorder.finish().expect("a file");
+        let context = Context::unattended();
+        let mut order = Vec::new();
+        let figures = play(&path, true, &context, |map, _| {
+            order.push(map.far.pixels[(0, 0)]);
+            Ok(())
+        });
+        let figures = figures.expect("played");
+        assert_eq!((order, figures.pairs, figures.unrelated_pairs), (vec![0, 1, 2, 3], 4, 0));
+        let mut shown = 0;
+        let error = play(&path, true, &context, |_, _| {
+            shown += 1;
+            context.cancel.cancel();
+            context.cancel.check("showing")
+        });
+        assert!(error.expect_err("cancelled").is_cancelled());
+        assert_eq!(shown, 1);
+    }
+
     /// The system limits this process's files to 4 kB (8 kB if the shell counts in KiB).
     #[test]
     #[cfg(target_os = "linux")]

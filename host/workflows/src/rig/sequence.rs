@@ -65,16 +65,10 @@ pub struct SequenceRequest {
     #[cfg_attr(feature = "clap", arg(long, requires = "steps"))]
     pub axis: Option<AxisName>,
     /// First position of the stack, um.
-    #[cfg_attr(
-        feature = "clap",
-        arg(long, value_name = "UM", allow_negative_numbers = true, requires = "steps")
-    )]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "UM", requires = "steps"))]
     pub from: Option<f64>,
     /// Last position of the stack, um.
-    #[cfg_attr(
-        feature = "clap",
-        arg(long, value_name = "UM", allow_negative_numbers = true, requires = "steps")
-    )]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "UM", requires = "steps"))]
     pub to: Option<f64>,
     /// Positions of the stack, both ends included, at most 10,000.
     #[cfg_attr(feature = "clap", arg(long, requires_all = ["axis", "from", "to"]))]

@@ -33,7 +33,7 @@ pub struct SunRequest {
     #[serde(flatten)]
     pub at: PlaceAndTime,
     /// Camera azimuth, ANTICLOCKWISE from north: with it the board computes a shadow.
-    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG", allow_negative_numbers = true))]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG"))]
     pub azimuth: Option<f64>,
     /// Height of the lens above the ground.
     #[cfg_attr(feature = "clap", arg(long, value_name = "M", default_value_t = Self::default().camera_height))]
@@ -44,7 +44,7 @@ pub struct SunRequest {
     /// Distance of the person from the optical axis, right positive.
     #[cfg_attr(
         feature = "clap",
-        arg(long, value_name = "M", default_value_t = Self::default().lateral, allow_negative_numbers = true)
+        arg(long, value_name = "M", default_value_t = Self::default().lateral)
     )]
     pub lateral: f64,
     /// Height of the person.

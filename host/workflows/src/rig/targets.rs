@@ -240,7 +240,9 @@ fn distances(asked_mm: &[f64], optics: &Optics) -> Result<Vec<f64>> {
     let usable = |mm: f64| mm.is_finite() && optics.alpha(mm).abs() <= LARGEST_ALPHA;
     if let Some(bad) = asked_mm.iter().find(|mm| !usable(**mm)) {
         let [nearest, farthest] = [LARGEST_ALPHA, -LARGEST_ALPHA].map(|alpha| optics.depth_mm(alpha));
-        let [nearest, farthest] = [(10.0 * nearest).ceil() / 10.0, (10.0 * farthest).floor() / 10.0];
+        // Inwards, to three digits of the range.
+        let scale = 10_f64.powf(2.0 - (farthest - nearest).log10().floor());
+        let [nearest, farthest] = [(scale * nearest).ceil() / scale, (scale * farthest).floor() / scale];
         let expected = format!("expected {nearest} to {farthest} mm, the range of the optics");
         return Err(WorkflowError::parameter("distances", bad, expected));
     }

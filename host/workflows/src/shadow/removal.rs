@@ -61,10 +61,10 @@ pub struct ShadowRemoveRequest {
     #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub camera: PathBuf,
     /// Latitude in degrees, north positive; with --lon and --time the light is the sun.
-    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG", allow_negative_numbers = true))]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG"))]
     pub lat: Option<f64>,
     /// Longitude in degrees, east positive.
-    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG", allow_negative_numbers = true))]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG"))]
     pub lon: Option<f64>,
     /// Time with its zone (RFC 3339), such as 2014-06-23T12:30:00+01:00.
     #[cfg_attr(feature = "clap", arg(long, value_name = "RFC3339"))]
@@ -73,7 +73,7 @@ pub struct ShadowRemoveRequest {
     #[cfg_attr(feature = "clap", arg(long, value_name = "RIGHT,AHEAD,UP", allow_hyphen_values = true))]
     pub lamp: Option<String>,
     /// Direction of the shadow measured in the picture instead, in degrees from right (0) towards down (90).
-    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG", allow_negative_numbers = true))]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG"))]
     pub shadow_direction: Option<f64>,
     /// Masks per second: `--time` is that of the first mask, and the sun moves.
     #[cfg_attr(feature = "clap", arg(long, value_name = "HZ"))]

@@ -78,13 +78,13 @@ pub struct MarkersRequest {
     /// Direction of the first view, degrees round the vertical.
     #[cfg_attr(
         feature = "clap",
-        arg(long, default_value_t = Self::default().first_view_deg, allow_negative_numbers = true)
+        arg(long, default_value_t = Self::default().first_view_deg)
     )]
     pub first_view_deg: f64,
     /// Angle from which the views look down, -90 to 90 degrees.
     #[cfg_attr(
         feature = "clap",
-        arg(long, default_value_t = Self::default().elevation_deg, allow_negative_numbers = true)
+        arg(long, default_value_t = Self::default().elevation_deg)
     )]
     pub elevation_deg: f64,
     /// Millimetres per pixel, 0.1 to 1000 (6 is the thesis' 167 pixels per metre).

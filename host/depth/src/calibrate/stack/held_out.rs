@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::ENOUGH_DEPTHS;
 use super::curve::{Curve, by_texture};
 use super::response::{LEARNED, Sample, Samples, WORTH};
+use crate::median::median;
 use crate::optics::{Optics, Stage, unexplained};
 use crate::validity::model_error;
 
@@ -132,12 +133,7 @@ fn tested(stage: &Stage, s: &Sample) -> Option<Judged> {
 }
 
 pub(super) fn robust(errors: impl Iterator<Item = f64>) -> f64 {
-    let mut sizes: Vec<f64> = errors.map(f64::abs).collect();
-    if sizes.is_empty() {
-        return f64::NAN;
-    }
-    let middle = sizes.len() / 2;
-    1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1
+    1.4826 * median(errors.map(f64::abs).collect(), f64::total_cmp).unwrap_or(f64::NAN)
 }
 
 fn rms(judged: &[Judged]) -> f64 {
@@ -169,9 +165,7 @@ pub(super) fn finish(
         Some((judged, inside, coarser)) => (judged, inside, Some(coarser)),
         None => (plain, inside, None),
     };
-    let mut left: Vec<f32> = judged.iter().map(|j| j.unexplained).collect();
-    let middle = left.len() / 2;
-    let median = f64::from(*left.select_nth_unstable_by(middle, f32::total_cmp).1);
+    let median = f64::from(median(judged.iter().map(|j| j.unexplained).collect(), f32::total_cmp)?);
     // Values below the model's error carry no information about it.
     let usual = |residual: f64| median.max(TELLING * residual * residual).max(1e-9);
     let predicted = |j: &Judged, residual: f64| {

@@ -16,6 +16,7 @@ use super::held_out::{HeldOut, Split, finish, judge, robust};
 use crate::adaptive_window::{Bank, LEARNED_PX, Window};
 use crate::coarseness::coarseness;
 use crate::measure::{DepthMethod, MeasureSettings, measure};
+use crate::median::median;
 use crate::optics::{Optics, Stage};
 use crate::pipeline::Settings;
 use crate::prepare::{PrepareSettings, Prepared, prepare_owned};
@@ -255,20 +256,25 @@ pub(super) fn learn(target: &Target<'_>) -> Result<Learned, StackError> {
 /// Difference between windows that the model's error explains; `None` if noise explains most of it.
 fn tolerance(small: &Best) -> Option<f64> {
     let (judged, _) = judge(&small.samples, small.degree, Split::Blocks, false)?;
-    let original = || judged.iter().filter(|j| j.original);
-    let explains = |error: f64| {
-        let squares = original().map(|j| (j.error / j.noise.hypot(error)).powi(2).min(LARGEST_SQUARE));
-        squares.sum::<f64>() <= original().count() as f64
-    };
-    let [mut low, mut error] = [0.0, 1.0];
-    for _ in 0..20 {
-        let middle = 0.5 * (low + error);
-        if explains(middle) { error = middle } else { low = middle }
-    }
-    let mut noise: Vec<f64> = original().map(|j| j.noise).collect();
-    let middle = noise.len() / 2;
-    let usual = *noise.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let errors: Vec<[f64; 2]> = judged.iter().filter(|j| j.original).map(|j| [j.error, j.noise]).collect();
+    let error = beyond_noise(&errors);
+    let usual = median(errors.iter().map(|[_, noise]| *noise).collect(), f64::total_cmp)?;
     (error > MODEL_LIMITED * usual).then(|| (TOLERATED * error).min(LARGEST_TOLERANCE))
+}
+
+/// Standard deviation, 0 to 1, that explains errors next to that of their noise.
+fn beyond_noise(errors: &[[f64; 2]]) -> f64 {
+    let explains = |by: f64| {
+        let squares =
+            errors.iter().map(|[error, noise]| (error / noise.hypot(by)).powi(2).min(LARGEST_SQUARE));
+        squares.sum::<f64>() <= errors.len() as f64
+    };
+    let [mut low, mut high] = [0.0, 1.0];
+    for _ in 0..20 {
+        let middle = 0.5 * (low + high);
+        if explains(middle) { high = middle } else { low = middle }
+    }
+    high
 }
 
 impl Target<'_> {
@@ -300,17 +306,8 @@ impl Target<'_> {
                 let prepared = prepare_owned(pair, &optics, None, &settings).ok()?;
                 // Equals a target with coarser texture, because blur and smoothing commute.
                 let [far_image, near_image] = [&prepared.far, &prepared.near].map(blurred);
-                let mut coarse = Prepared { far: far_image, near: near_image, ..prepared.clone() };
-                let noise = &mut coarse.noise;
-                for value in [
-                    &mut noise.constant,
-                    &mut noise.per_unit,
-                    &mut noise.mean_variance,
-                    &mut noise.coding,
-                    &mut noise.added,
-                ] {
-                    *value *= SMOOTHED_NOISE;
-                }
+                let noise = prepared.noise.scaled(SMOOTHED_NOISE);
+                let coarse = Prepared { far: far_image, near: near_image, noise, ..prepared.clone() };
                 let pair =
                     |prepared, original| Pair { far, coarseness: coarseness(&prepared), prepared, original };
                 Some([pair(prepared, true), pair(coarse, false)])
@@ -383,5 +380,21 @@ impl Target<'_> {
             }
         }
         (samples, looked_at)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn outliers_do_not_raise_the_error_of_the_model() {
+        let errors = |outliers: usize| -> Vec<[f64; 2]> {
+            (0..1000).map(|i| [if i < outliers { 0.9 } else { 0.05 }, 0.03]).collect()
+        };
+        for outliers in [0, 10] {
+            let found = beyond_noise(&errors(outliers));
+            assert!((found - 0.04).abs() < 0.003, "{outliers}: {found}");
+        }
     }
 }

@@ -8,21 +8,11 @@ use crate::readers::recording::number;
 
 pub const CONFIDENCES: [&str; 9] =
     ["likelihood", "score", "confidence", "conf", "visibility", "visible", "vis", "probability", "prob"];
-pub const FRAMES: [&str; 9] = [
-    "frame_idx",
-    "frameNumber",
-    "frame",
-    "frame_number",
-    "frame_id",
-    "frame_index",
-    "frame#",
-    "frame_no",
-    "frame_num",
-];
-pub const TIMES: [&str; 11] = [
+pub const FRAMES: [&str; 7] =
+    ["frame_idx", "frame", "frame_number", "frame_id", "frame_index", "frame_no", "frame_num"];
+pub const TIMES: [&str; 10] = [
     "time",
     "t",
-    "time (s)",
     "time_s",
     "time_sec",
     "time_ms",
@@ -46,9 +36,9 @@ pub const POINTS: [&str; 11] = [
     "part",
     "node",
 ];
-pub const PEOPLE: [&str; 6] = ["track", "track_id", "person", "person_id", "person_idx", "skeletonID"];
+pub const PEOPLE: [&str; 6] = ["track", "track_id", "person", "person_id", "person_idx", "skeleton_id"];
 /// Of people in some tables, and of rows or recordings in others.
-const PERHAPS_PEOPLE: [&str; 15] = [
+const PERHAPS_PEOPLE: [&str; 12] = [
     "id",
     "pid",
     "player",
@@ -60,21 +50,26 @@ const PERHAPS_PEOPLE: [&str; 15] = [
     "object_id",
     "tracking_id",
     "body_id",
-    "bodyID",
     "user_id",
-    "user-id",
-    "userID",
 ];
 /// A recording has fewer people; more are those of a collection of recordings.
 const MOST_PEOPLE: usize = 16;
 /// Ends of names that state the unit of their times, and the units in a second.
-const STATED: [(&str, f64); 5] = [("_s", 1.0), ("(s)", 1.0), ("_sec", 1.0), ("_ms", 1e3), ("_us", 1e6)];
+const STATED: [(&str, f64); 6] =
+    [("_s", 1.0), ("(s)", 1.0), ("[s]", 1.0), ("_sec", 1.0), ("_ms", 1e3), ("_us", 1e6)];
 /// Longest steps of times without a stated unit, and the units in a second: seconds, milliseconds, microseconds, 100 ns (Kinect).
 /// Longer steps are nanoseconds.
 const UNITS: [(f64, f64); 4] = [(2.0, 1.0), (2e3, 1e3), (2e5, 1e6), (2e6, 1e7)];
 
+/// A name without case, blanks and punctuation: `Person ID` and `person_id` are one.
+pub fn simple(name: &str) -> String {
+    let letters = name.chars().filter(char::is_ascii_alphanumeric);
+    letters.map(|c| c.to_ascii_lowercase()).collect()
+}
+
 pub fn is_of(column: &str, known: &[&str]) -> bool {
-    known.iter().any(|name| column.eq_ignore_ascii_case(name))
+    let own = simple(column);
+    known.iter().any(|name| simple(name) == own)
 }
 
 pub fn place(columns: &StringRecord, known: &[&str]) -> Option<usize> {
@@ -145,6 +140,7 @@ mod tests {
     fn times_are_read_in_the_unit_that_makes_their_rate_one_of_a_camera() {
         for (column, step) in [
             ("time_s", 0.04),
+            ("Time [s]", 0.04),
             ("timestamp_ms", 40.0),
             ("timestamp", 40_000.0),
             ("Timestamp", 400_000.0),
@@ -184,6 +180,7 @@ mod tests {
     fn a_column_of_numbers_is_one_of_people_if_they_recur_and_share_frames() {
         for (text, are_points, found) in [
             ("frame,id\n0,1\n0,2\n1,1\n1,2", false, Some(1)),
+            ("Frame #,Person ID\n0,1\n1,2", false, Some(1)),
             ("frame,id\n0,1\n1,2\n2,3\n3,4", false, None),
             ("frame,id\n0,1\n0,2\n1,3\n1,4", false, None),
             ("frame,subject\n0,ann\n1,ann\n2,ann", false, None),

@@ -9,7 +9,7 @@ use csv::StringRecord;
 
 use super::{
     LEAST_AXES, check_width,
-    columns::{CONFIDENCES, FRAMES, POINTS, TIMES, people, place},
+    columns::{CONFIDENCES, FRAMES, POINTS, TIMES, people, place, simple},
     coordinate, line, unseparated,
 };
 use crate::readers::{
@@ -175,8 +175,7 @@ fn columns(header: &StringRecord, below: &[StringRecord]) -> Option<Columns> {
 
 /// The word for points in the name of a column that tells them apart.
 pub fn point_column(column: &str) -> Option<&'static str> {
-    let letters = column.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase());
-    let simple: String = letters.collect();
+    let simple = simple(column);
     POINTS
         .into_iter()
         .find(|word| simple.strip_prefix(*word).is_some_and(|rest| rest.is_empty() || WORDS.contains(&rest)))
@@ -270,25 +269,9 @@ fn unordered(row: &StringRecord) -> RecordingError {
 mod tests {
     use crate::readers::{
         self,
+        csv::sample::{BODY, COCO},
         recording::{Choices, Recording, RecordingError},
     };
-
-    /// COCO's points without eyes and ears, 170 pixels tall.
-    const BODY: [(usize, &str, [f64; 2]); 13] = [
-        (0, "nose", [100.0, 30.0]),
-        (5, "left_shoulder", [118.0, 50.0]),
-        (6, "right_shoulder", [82.0, 50.0]),
-        (7, "left_elbow", [124.0, 78.0]),
-        (8, "right_elbow", [76.0, 78.0]),
-        (9, "left_wrist", [126.0, 104.0]),
-        (10, "right_wrist", [74.0, 104.0]),
-        (11, "left_hip", [109.0, 100.0]),
-        (12, "right_hip", [91.0, 100.0]),
-        (13, "left_knee", [109.0, 142.0]),
-        (14, "right_knee", [91.0, 142.0]),
-        (15, "left_ankle", [109.0, 184.0]),
-        (16, "right_ankle", [91.0, 184.0]),
-    ];
 
     fn read(header: &str, rows: &[String], person: Option<usize>) -> Result<Recording, RecordingError> {
         let text = format!("{header}\n{}\n", rows.join("\n"));
@@ -297,8 +280,9 @@ mod tests {
 
     /// Rows of all points in two frames.
     fn rows(row: impl Fn(usize, usize, &str, [f64; 2]) -> String) -> Vec<String> {
-        let frame = |frame: usize| BODY.map(|(number, name, place)| row(frame, number, name, place));
-        (0..2).flat_map(frame).collect()
+        let points = || COCO.into_iter().zip(BODY);
+        let frame = |frame: usize| points().map(move |(number, (name, place))| (frame, number, name, place));
+        (0..2).flat_map(frame).map(|(frame, number, name, place)| row(frame, number, name, place)).collect()
     }
 
     #[track_caller]
@@ -350,8 +334,7 @@ mod tests {
                 28 => "right_ankle",
                 _ => "left_knee",
             };
-            let place =
-                BODY.iter().find(|(_, known, _)| *known == name).map_or([1.0; 2], |(_, _, place)| *place);
+            let place = BODY.iter().find(|(known, _)| *known == name).map_or([1.0; 2], |(_, place)| *place);
             format!("{frame},{number},{},{},-0.2", place[0] / 320.0, place[1] / 200.0)
         };
         let rows: Vec<String> =
@@ -393,9 +376,9 @@ mod tests {
         let row = |person: usize, frame: usize| {
             let place =
                 |[x, y]: [f64; 2]| format!(",{},{},{}", 10.0 * x, 2000 * person + 5, 1900.0 - 10.0 * y);
-            format!("{frame},{person}{}", BODY.map(|(_, _, own)| place(own)).concat())
+            format!("{frame},{person}{}", BODY.map(|(_, own)| place(own)).concat())
         };
-        let names = BODY.map(|(_, name, _)| format!(",{name}_x,{name}_y,{name}_z")).concat();
+        let names = BODY.map(|(name, _)| format!(",{name}_x,{name}_y,{name}_z")).concat();
         let rows: Vec<String> = (0..6).map(|n| row(1 + n / 3, n % 3)).collect();
         for column in ["person_id", "id"] {
             let found = read(&format!("frame,{column}{names}"), &rows, Some(2)).expect("two people");

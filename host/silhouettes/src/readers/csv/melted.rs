@@ -2,13 +2,13 @@
 //! the name of the value (`nose_x`, or `x` next to a point) and the value. They become tables with a column for each name. Linear in
 //! the file.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use csv::StringRecord;
 
 use super::{
     check_width,
-    columns::{FRAMES, TIMES, is_of, people, place},
+    columns::{CONFIDENCES, FRAMES, TIMES, is_of, people, place},
     coordinate, line,
     long::{check_cells, point_column},
     unseparated,
@@ -17,7 +17,7 @@ use crate::readers::recording::RecordingError;
 
 /// What columns of values' names are called.
 const NAMES: [&str; 8] = ["variable", "name", "key", "measure", "coords", "coord", "coordinate", "axis"];
-const AXES: [&str; 4] = ["coords", "coord", "coordinate", "axis"];
+const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// The cells that tell a group from others, and the number of values of its names before it.
 type Key<'a> = (Vec<&'a str>, usize);
@@ -32,16 +32,21 @@ struct Group<'a> {
 /// The rows as they are, if they are not those of values.
 pub fn cast(rows: Vec<StringRecord>) -> Result<Vec<StringRecord>, RecordingError> {
     let Some((header, below)) = rows.split_first() else { return Ok(rows) };
-    let name = NAMES.iter().find_map(|name| place(header, &[*name]));
-    let (Some(name), Some(value)) = (name, place(header, &["value"])) else { return Ok(rows) };
+    let named: Vec<usize> = NAMES.iter().filter_map(|name| place(header, &[*name])).collect();
+    let (Some(first), Some(value)) = (named.first(), place(header, &["value"])) else { return Ok(rows) };
     let is_axis = |column: &str| coordinate(column).or_else(|| unseparated(column)).is_some();
     if place(header, &["x"]).is_some() || header.iter().any(is_axis) {
         return Ok(rows);
     }
     let has_points = header.iter().any(|column| point_column(column).is_some());
-    let axis = place(header, &AXES).filter(|_| !has_points && is_of(&header[name], &["name"]));
-    // Next to an axis, a name is that of a point.
-    let (name, point) = axis.map_or((name, None), |axis| (axis, Some(name)));
+    let has_axes = |at: &usize| {
+        let cells: HashSet<&str> = below.iter().filter_map(|row| row.get(*at)).collect();
+        cells.into_iter().all(|cell| is_of(cell, &AXES) || is_of(cell, &CONFIDENCES))
+    };
+    let axis = named.iter().copied().find(has_axes).filter(|_| !has_points);
+    // Next to an axis, another name is that of a point.
+    let name = axis.unwrap_or(*first);
+    let point = named.iter().copied().find(|at| axis.is_some_and(|axis| axis != *at));
     let person = people(header, below, true);
     let is_frame = |column: &str| is_of(column, &FRAMES) || is_of(column, &TIMES);
     let is_key = |at: &usize| {
@@ -106,20 +111,9 @@ pub fn cast(rows: Vec<StringRecord>) -> Result<Vec<StringRecord>, RecordingError
 mod tests {
     use crate::readers::{
         self,
+        csv::sample::BODY,
         recording::{Choices, Recording, RecordingError},
     };
-
-    const BODY: [(&str, [f64; 2]); 9] = [
-        ("nose", [100.0, 30.0]),
-        ("left_shoulder", [118.0, 50.0]),
-        ("right_shoulder", [82.0, 50.0]),
-        ("left_hip", [109.0, 100.0]),
-        ("right_hip", [91.0, 100.0]),
-        ("left_knee", [109.0, 142.0]),
-        ("right_knee", [91.0, 142.0]),
-        ("left_ankle", [109.0, 184.0]),
-        ("right_ankle", [91.0, 184.0]),
-    ];
 
     fn read(header: &str, rows: &[String], person: Option<usize>) -> Result<Recording, RecordingError> {
         let text = format!("{header}\n{}\n", rows.join("\n"));
@@ -145,6 +139,10 @@ mod tests {
             ),
             (
                 "frame,name,axis,value",
+                rows(|frame, name, axis, value| format!("{frame},{name},{axis},{value}")),
+            ),
+            (
+                "Frame Number,name,variable,value",
                 rows(|frame, name, axis, value| format!("{frame},{name},{axis},{value}")),
             ),
             ("name,value", rows(|_, name, axis, value| format!("{name}.{axis},{value}"))),

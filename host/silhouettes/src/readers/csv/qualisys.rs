@@ -7,6 +7,7 @@ use super::{line, points};
 use crate::readers::recording::{
     Found, Known, RecordingError, Source, Unit, Up, check_last_row, number, promised_frames,
 };
+use crate::readers::trc::is_hidden;
 
 /// The key of the number of frames.
 const FRAMES: &str = "NO_OF_FRAMES";
@@ -21,7 +22,7 @@ pub fn read(rows: &[StringRecord]) -> Result<Option<Found>, RecordingError> {
         names.pop();
     }
     let is_frame =
-        |row: &&StringRecord| row.get(0).is_some_and(|cell| cell.is_empty() || number(cell).is_some());
+        |row: &&StringRecord| row.get(0).is_some_and(|cell| is_hidden(cell) || number(cell).is_some());
     let below: Vec<&StringRecord> = rows[names_at + 1..].iter().filter(is_frame).collect();
     let widest = below.iter().map(|row| row.len()).max().unwrap_or(0);
     let numbers = 3 * names.len();
@@ -69,6 +70,7 @@ mod tests {
         let axes = "Frame\tTime\tLFHD X\tLFHD Y\tLFHD Z\tLTOE X\tLTOE Y\tLTOE Z\n";
         for text in [
             file("", ["1\t2\t1700\t4\t5\t60", "\t\t\t4\t5\t60"]),
+            file("", ["1\t2\t1700\t4\t5\t60", "NULL\tNULL\tNULL\t4\t5\t60"]),
             file(axes, ["1\t0.00\t1\t2\t1700\t4\t5\t60", "2\t0.01\t0\t0\t0\t4\t5\t60"]),
         ] {
             for ending in ["tsv", "csv"] {

@@ -231,24 +231,7 @@ fn numbered(column: &str) -> Option<(&str, usize)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::readers::{self, recording::Recording};
-
-    /// A person 170 pixels tall; the left wrist is further to the right in the picture, and the right arm raised.
-    const BODY: [(&str, [f64; 2]); 13] = [
-        ("nose", [100.0, 30.0]),
-        ("left_shoulder", [118.0, 50.0]),
-        ("right_shoulder", [82.0, 50.0]),
-        ("left_elbow", [124.0, 78.0]),
-        ("right_elbow", [76.0, 25.0]),
-        ("left_wrist", [126.0, 104.0]),
-        ("right_wrist", [74.0, 2.0]),
-        ("left_hip", [109.0, 100.0]),
-        ("right_hip", [91.0, 100.0]),
-        ("left_knee", [109.0, 142.0]),
-        ("right_knee", [91.0, 142.0]),
-        ("left_ankle", [109.0, 184.0]),
-        ("right_ankle", [91.0, 184.0]),
-    ];
+    use crate::readers::{self, csv::sample::BODY, recording::Recording};
 
     fn read(text: &str, person: Option<usize>) -> Result<Recording, RecordingError> {
         readers::read(text.as_bytes(), "csv", Choices { person, ..Choices::default() })

@@ -69,19 +69,19 @@ fn a_given_step_unlike_the_stated_one_has_a_remark() {
     assert!(remark.contains("0.1 mm") && remark.contains("--step-mm 0.5"), "{remark}");
     let um_as_mm = contradiction(0.5, Some(Ok(0.5))).unwrap();
     assert!(um_as_mm.contains("a step of 0.0005 mm") && agrees(0.0005, &Ok(0.5)), "{um_as_mm}");
-    let uneven = even_step(&[0.0, 100.0, 230.0, 300.0], &CalibrateStackRequest::default());
+    let uneven = even_step(&[0.0, 100.0, 230.0, 300.0], &CalibrateStackRequest::default(), "");
     assert!(contradiction(0.1, Some(uneven)).unwrap().contains("uneven"));
 }
 
 #[test]
 fn uneven_positions_are_refused_by_the_slices_between_which_they_are() {
     let request = CalibrateStackRequest::default();
-    assert!((even_step(&[5.0, 4.0, 3.02, 2.0], &request).unwrap() - 1.0).abs() < 1e-12);
-    let error = even_step(&[0.0, 1.0, 2.0, 3.5], &request).unwrap_err().to_string();
+    assert!((even_step(&[5.0, 4.0, 3.02, 2.0], &request, "").unwrap() - 1.0).abs() < 1e-12);
+    let error = even_step(&[0.0, 1.0, 2.0, 3.5], &request, "").unwrap_err().to_string();
     assert!(error.contains("slices 3 and 4 are 1.5"), "{error}");
-    let microscope = even_step(&[0.0, 2e-5, 4e-5, 8e-5], &request).unwrap_err().to_string();
+    let microscope = even_step(&[0.0, 2e-5, 4e-5, 8e-5], &request, "").unwrap_err().to_string();
     assert!(microscope.contains("slices 3 and 4 are 0.00004 apart, 0.00002 is usual"), "{microscope}");
-    let standing = even_step(&[1.0, 1.0, 2.0], &request).unwrap_err().to_string();
+    let standing = even_step(&[1.0, 1.0, 2.0], &request, "").unwrap_err().to_string();
     assert!(standing.contains("slices 1 and 2 are 0"), "{standing}");
 }
 

@@ -2,21 +2,9 @@
 
 use crate::readers::{
     self,
-    csv::long::point_column,
+    csv::{long::point_column, sample::BODY},
     recording::{Choices, Recording},
 };
-
-const BODY: [(&str, [f64; 2]); 9] = [
-    ("nose", [100.0, 30.0]),
-    ("left_shoulder", [118.0, 50.0]),
-    ("right_shoulder", [82.0, 50.0]),
-    ("left_hip", [109.0, 100.0]),
-    ("right_hip", [91.0, 100.0]),
-    ("left_knee", [109.0, 142.0]),
-    ("right_knee", [91.0, 142.0]),
-    ("left_ankle", [109.0, 184.0]),
-    ("right_ankle", [91.0, 184.0]),
-];
 
 #[track_caller]
 fn read(text: &str) -> Recording {
