@@ -78,16 +78,22 @@ pub fn comparable(measured: &[Vec<f64>]) -> Vec<Vec<f64>> {
     measured.iter().map(of_slice).collect()
 }
 
+/// Slices that show anything, and their numbers: a black slice has no place in the order.
+fn shown(sharpness: &[Vec<f64>]) -> (Vec<usize>, Vec<&[f64]>) {
+    sharpness.iter().map(Vec::as_slice).enumerate().filter(|(_, slice)| !slice.is_empty()).unzip()
+}
+
 /// Pairs of slices that look exchanged, from the [`comparable`] sharpness of each slice in the given order. Not found: neighbours at an
 /// end, slices equally far from the focus of a flat target, and differences below the noise.
 pub fn exchanged(sharpness: &[Vec<f64>]) -> Vec<[usize; 2]> {
     let mut found = Vec::new();
-    let Some(mut path) = Path::of(sharpness) else { return found };
+    let (numbers, sharpness) = shown(sharpness);
+    let Some(mut path) = Path::of(&sharpness) else { return found };
     while found.len() < sharpness.len() / 3
         && let Some([a, b]) = path.exchange()
     {
         path.slices.swap(a, b);
-        found.push([a - 1, b - 1]);
+        found.push([numbers[a - 1], numbers[b - 1]]);
     }
     found
 }
@@ -95,7 +101,8 @@ pub fn exchanged(sharpness: &[Vec<f64>]) -> Vec<[usize; 2]> {
 /// The first slice of a stack whose order is wrapped (6 to 9, then 1 to 5), from the [`comparable`] sharpness of each slice in the given order.
 /// Not found: a single slice at the wrong end, which looks like a bad one.
 pub fn wrapped(sharpness: &[Vec<f64>]) -> Option<usize> {
-    let path = Path::of(sharpness)?;
+    let (numbers, sharpness) = shown(sharpness);
+    let path = Path::of(&sharpness)?;
     let from = |first: usize| {
         let mut order = path.order();
         order[1..=sharpness.len()].rotate_left(first);
@@ -108,13 +115,14 @@ pub fn wrapped(sharpness: &[Vec<f64>]) -> Option<usize> {
     let removed = |excess: &[f64]| total(&given) - total(excess);
     let least = REMOVED_BY_ABSENCE * removed(&excess);
     let is_one_bad = || (0..sharpness.len()).any(|absent| removed(&path.without(absent)) > least);
-    (path.is_better(&given, &excess) && !is_one_bad()).then_some(first)
+    (path.is_better(&given, &excess) && !is_one_bad()).then(|| numbers[first])
 }
 
 /// A slice that is sharp everywhere and does not fit into the order, such as a picture that is composed of the others, from the
 /// [`comparable`] sharpness of each slice.
 pub fn composed(sharpness: &[Vec<f64>]) -> Option<usize> {
-    let path = Path::of(sharpness)?;
+    let (numbers, sharpness) = shown(sharpness);
+    let path = Path::of(&sharpness)?;
     let is_sharp = |own: &usize| {
         let others = || sharpness.iter().enumerate().filter(move |(other, _)| other != own);
         let sharpest = |block: usize| others().map(|(_, other)| other[block]).fold(0.0, f64::max);
@@ -127,10 +135,11 @@ pub fn composed(sharpness: &[Vec<f64>]) -> Option<usize> {
         let mut others = (0..sharpness.len()).filter(|other| other != own);
         others.all(|other| total(excess) < LEFT_OF_ABSENT * total(&path.without(other)))
     };
-    (0..sharpness.len()).filter(is_sharp).find(|own| {
+    let found = (0..sharpness.len()).filter(is_sharp).find(|own| {
         let excess = path.without(*own);
         path.is_right(&excess) && is_alone(own, &excess)
-    })
+    });
+    found.map(|own| numbers[own])
 }
 
 fn total(excess: &[f64]) -> f64 {
@@ -145,12 +154,12 @@ struct Path {
 }
 
 impl Path {
-    fn of(sharpness: &[Vec<f64>]) -> Option<Self> {
-        if sharpness.len() < FEWEST || sharpness.iter().any(Vec::is_empty) {
+    fn of(sharpness: &[&[f64]]) -> Option<Self> {
+        if sharpness.len() < FEWEST {
             return None;
         }
         let logarithms =
-            |slice: &Vec<f64>| slice.iter().map(|value| value.max(f64::MIN_POSITIVE).ln()).collect();
+            |slice: &&[f64]| slice.iter().map(|value| value.max(f64::MIN_POSITIVE).ln()).collect();
         let mut slices: Vec<Vec<f64>> = sharpness.iter().map(logarithms).collect();
         let extreme = |of: fn(f64, f64) -> f64| -> Vec<f64> {
             let blocks = 0..slices[0].len();
@@ -442,6 +451,24 @@ mod tests {
             let all = measured(&[good.clone(), vec![bad]].concat());
             assert!(all[..15] == usual, "{:?}", all[0]);
         }
+    }
+
+    #[test]
+    fn slices_around_a_black_one_keep_their_order() {
+        let good = stack(&even(15), [3.0, 11.0], 0.02);
+        let with_black = |mut images: Vec<Array2<f32>>| {
+            images.insert(2, Array2::zeros(SIZE));
+            measured(&images)
+        };
+        let mut images = good.clone();
+        images.rotate_right(5);
+        assert_eq!(wrapped(&with_black(images)), Some(6));
+        let mut images = good.clone();
+        images.swap(7, 9);
+        assert_eq!(exchanged(&with_black(images)), [[8, 10]]);
+        let mut images = good;
+        images.insert(7, scene(1));
+        assert_eq!(composed(&with_black(images)), Some(8));
     }
 
     #[test]

@@ -387,8 +387,9 @@ where
         }
         let wrapped = slice_order::wrapped(&neighbours.sharpness);
         if wrapped.is_some() && self.link(count - 1, 0)?.registered >= FOREIGN * registered {
-            frames =
-                Frames { wrapped, left_out: Vec::new(), untold: Vec::new(), exchanged: Vec::new(), ..frames };
+            // Only a black frame is bad in any order.
+            frames.left_out.retain(|(index, _)| neighbours.sharpness[*index].is_empty());
+            frames = Frames { wrapped, untold: Vec::new(), exchanged: Vec::new(), ..frames };
         }
         Ok(frames)
     }
