@@ -118,7 +118,7 @@ class McapRecording:
             write(topic, self._image, {"encoding": encoding, "is_bigendian": 0, "step": pixels.strides[0], "data": pixels.tobytes()})
 
         for name, pixels in (("far", far), ("near", near)):
-            if pixels.shape != (height, width) or pixels.dtype not in (np.dtype("u1"), np.dtype("u2")):
+            if pixels.shape != (height, width) or pixels.dtype.newbyteorder("=") not in (np.dtype("u1"), np.dtype("u2")):
                 raise FarnearError(f"{name} is {pixels.dtype} of {pixels.shape}; expected uint8 or uint16 of {(height, width)}")
         points = points_m(found)
         for name, pixels in (("far", far), ("near", near)):

@@ -38,13 +38,17 @@ def plot(found: DepthMap, ax: Optional[Any] = None) -> Any:
 def to_xarray(found: DepthMap) -> Any:
     """Maps of (row, column) in px with their units as an `xarray.Dataset`.
 
-    `depth` and `deviation` are in mm, `confidence` is 0 to 1, `reason` a number of `DepthMap.reason_words`.
+    `depth` and `deviation` are in mm, `confidence` is 0 to 1, `reason` a number of `DepthMap.reason_words`. A map of a part of its
+    images has the attribute `part`, as `DepthMap.part`.
     """
     try:
         import xarray
     except ImportError as error:
         raise FarnearError("xarray is not installed; `pip install xarray` installs it") from error
     dimensions = ("row", "column")
+    attributes: dict[str, Any] = {"optics": found.optics.dumps(), "findings": "; ".join(found.findings)}
+    if found.part is not None:
+        attributes["part"] = found.part
     return xarray.Dataset(
         {
             "depth": (dimensions, found.depth_mm, {"units": "mm", "long_name": "distance from the lens"}),
@@ -52,5 +56,5 @@ def to_xarray(found: DepthMap) -> Any:
             "confidence": (dimensions, found.confidence, {"units": "1"}),
             "reason": (dimensions, found.reasons, {"flag_meanings": str(found.reason_words)}),
         },
-        attrs={"optics": found.optics.dumps(), "findings": "; ".join(found.findings)},
+        attrs=attributes,
     )

@@ -270,7 +270,7 @@ class Rig:
                 if late_s < 0:
                     time.sleep(-late_s)
                 elif late_s > LATE_S:
-                    warnings.warn(f"event {dict(first.index)} starts {late_s:.1f} s late", stacklevel=2)
+                    warnings.warn(f"{_name(first)} starts {late_s:.1f} s late", stacklevel=2)
             positions = [(axis, float(event.z_pos)) for event in part]
             exposure_ms = 5.0 if first.exposure is None else float(first.exposure)
             light = None if first.channel is None else channels[first.channel.config]
@@ -283,12 +283,18 @@ LATE_S = 0.5
 """Delay of a time lapse from which a warning is issued."""
 
 
+def _name(event: Any) -> str:
+    # The keys are members of an enum, whose `repr` a reader would not expect.
+    indices = ", ".join(f"{key} = {number}" for key, number in event.index.items())
+    return f"event {indices}".strip()
+
+
 def _program(event: Any) -> tuple[Any, Any, Any]:
     return event.exposure, event.channel, event.min_start_time
 
 
 def _check(event: Any, axis: str, info: Mapping[str, Any], channels: Mapping[str, tuple[float, float]]) -> None:
-    name = f"event {dict(event.index)}"
+    name = _name(event)
     action = getattr(event.action, "type", "acquire_image") if event.action is not None else "acquire_image"
     if action != "acquire_image":
         raise FarnearError(f"{name} asks for the action {action!r}; expected images only. Find the focus with `farnear rig focus` before")

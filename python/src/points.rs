@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use crate::{
     arrays::{Map, named, optics_named},
     depth_map::{Place, part_of},
-    errors::wrong,
+    errors::{FarnearError, wrong},
     work,
 };
 
@@ -43,6 +43,16 @@ pub fn points_mm<'py>(
     let depth_mm: Map<'py> = named("depth_mm", depth_mm)?;
     let optics = &*optics_named("optics", optics)?;
     let depth_mm = depth_mm.view();
+    let (rows, columns) = depth_mm.dim();
+    let lies_within =
+        |begin: usize, size: usize, all: usize| begin.checked_add(size).is_some_and(|end| end <= all);
+    if let Some(part @ (x, y, width, height)) = part
+        && !(lies_within(x, columns, width) && lies_within(y, rows, height))
+    {
+        return Err(FarnearError::new_err(format!(
+            "part is {part:?} for a map of {columns}x{rows} px; expected its column and row, and width and height of the images"
+        )));
+    }
     let part = part.map(part_of);
     let points = work::run(py, || farnear_workflows::measure::points_mm(depth_mm, &optics.0, part))?;
     Ok(points.map_err(wrong)?.into_pyarray(py))

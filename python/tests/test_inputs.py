@@ -114,6 +114,9 @@ def test_a_map_of_a_region_keeps_its_place(optics, slant, tmp_path):
     depth_mm[place] = region.depth_mm
     points = farnear.points_mm(region.depth_mm, optics, part=region.part)
     np.testing.assert_array_equal(points, farnear.points_mm(depth_mm, optics)[place])
+    for part in ((221, 10, 320, 240), (200, 10, 320, 109), (2**63, 10, 320, 240)):
+        with pytest.raises(farnear.FarnearError, match="map of 100x100 px"):
+            farnear.points_mm(region.depth_mm, optics, part=part)
     whole = farnear.DepthMap._assemble(depth_mm, depth_mm, depth_mm, np.zeros((240, 320), np.uint8), [], 1.0, optics)
     assert whole.part is None
     for name in ("slope_x", "slope_y", "tilt_deg"):
@@ -231,6 +234,11 @@ def test_maps_go_to_xarray_and_come_from_it(found, optics, slant):
     xarray = pytest.importorskip("xarray")
     data = found.to_xarray()
     assert data["depth"].attrs["units"] == "mm" and data["depth"].dims == ("row", "column")
+    maps = (found.depth_mm, found.confidence, found.deviation_mm, found.reasons)
+    height, width = found.depth_mm.shape
+    part = (200, 10, width + 300, height + 20)
+    region = farnear.DepthMap._assemble(*maps, found.findings, found.valid_fraction, optics, part)
+    assert region.to_xarray().attrs["part"] == part and "part" not in data.attrs
     again = farnear.depth(xarray.DataArray(slant[0]), xarray.DataArray(slant[1]), optics)
     assert np.array_equal(again.depth_mm, found.depth_mm, equal_nan=True)
 

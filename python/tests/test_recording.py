@@ -43,6 +43,19 @@ def test_a_recording_is_read_by_another_reader(optics, slant, tmp_path):
     assert points[row, column, 0] == pytest.approx(expected, rel=1e-3, abs=1e-6)
 
 
+def test_images_may_have_any_byte_order(optics, slant, tmp_path):
+    reader = pytest.importorskip("mcap.reader")
+    decoder = pytest.importorskip("mcap_ros2.decoder")
+    far, near = (image.astype(np.uint16) * 257 for image in slant[:2])
+    with McapRecording(tmp_path / "pairs.mcap") as recording:
+        recording.add(far.astype(">u2"), near, farnear.depth(far, near, optics))
+    with open(tmp_path / "pairs.mcap", "rb") as file:
+        messages = reader.make_reader(file, decoder_factories=[decoder.DecoderFactory()]).iter_decoded_messages()
+        image = next(decoded for _, channel, _, decoded in messages if channel.topic == "/farnear/far/image")
+    assert image.encoding == "mono16" and not image.is_bigendian
+    assert np.array_equal(np.frombuffer(bytes(image.data), "<u2").reshape(far.shape), far)
+
+
 def test_images_that_do_not_fit_are_refused(optics, slant, tmp_path):
     pytest.importorskip("mcap_ros2.writer")
     far, near, _ = slant

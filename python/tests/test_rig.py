@@ -96,6 +96,14 @@ def test_refuses_events_that_the_rig_cannot_do(emulated_rig):
             emulated_rig.run_sequence([useq.MDAEvent(z_pos=50), event])
 
 
+def test_events_are_named_by_their_indices(emulated_rig):
+    useq = pytest.importorskip("useq")
+    emulated_rig.home()
+    events = useq.MDASequence(channels=["lit"], z_plan={"absolute": [50, 1e5]})
+    with pytest.raises(farnear.FarnearError, match="event c = 0, z = 1: the fine position 100000 um is outside"):
+        list(emulated_rig.run_sequence(events, channels={"lit": (50, 0)}))
+
+
 def test_a_rig_that_was_left_is_closed(emulated_rig):
     with emulated_rig as rig:
         assert rig.info()["emulated"]

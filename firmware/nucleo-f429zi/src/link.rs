@@ -23,8 +23,8 @@ use farnear_protocol::{frame::FRAME_MAX, message::LinkRate};
 use crate::clock::APB1_TIMER_HZ;
 
 const APB1_HZ: u32 = APB1_TIMER_HZ / 2;
-/// 5 ms of bytes, 25 control ticks.
-const RECEIVE_RING: usize = 1024;
+/// 20 ms of bytes: as many requests as may be outstanding, sent at once while a correction is solved (up to 8 ms).
+const RECEIVE_RING: usize = 4096;
 /// Three of the longest frames with delimiters, and a power of two, so that wrapping needs no division.
 const SEND_RING: usize = 4 * FRAME_MAX;
 

@@ -334,6 +334,9 @@ impl Rig {
         let now = inputs.now;
         if inputs.emergency_stop {
             self.alarm(Alarm::EmergencyStop, now);
+            // Without their supply the drivers forget the microstep, so rotors at rest snap by up to half a period afterwards.
+            self.stage.coarse.lose();
+            self.stage.lens.lose();
         }
         if inputs.supply_low {
             self.alarm(Alarm::SupplyLow, now);

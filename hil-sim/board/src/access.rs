@@ -56,9 +56,14 @@ impl RigAccess<'_, '_> {
         self.session.reset_by_pin(self.stop.at, self.stop.instruction_count, self.host);
     }
 
-    /// `pressed` opens the circuit.
+    /// `pressed` opens the circuit. Its third contact cuts the supply of the drivers, which forget the microstep.
     pub fn set_emergency_stop(&mut self, pressed: bool) {
         self.wiring.press_stop(pressed);
+        self.plant(|plant| {
+            for name in [StageName::Sensor, StageName::Lens] {
+                plant.stage_mut(name).reset_sequencer();
+            }
+        });
     }
 
     pub fn set_driver_fault(&mut self, stage: StageName, fault: bool) {

@@ -6,7 +6,7 @@
 
 use std::{
     sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
+        Arc, Mutex, MutexGuard, PoisonError, Weak,
         atomic::{AtomicBool, Ordering},
         mpsc::{RecvTimeoutError, Sender, channel, sync_channel},
     },
@@ -56,6 +56,8 @@ struct Port {
     timing: Arc<Mutex<Timing>>,
     wanted: Option<LinkRate>,
     known: Mutex<Known>,
+    /// Ids of work, and whether a handle still has it.
+    works: Mutex<Vec<(u32, Weak<()>)>>,
     inbox: Option<Sender<Command>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -143,6 +145,7 @@ impl Client {
             timing,
             wanted: rates.1,
             known: Mutex::default(),
+            works: Mutex::default(),
             inbox: Some(inbox),
             thread: Some(thread),
         };
@@ -187,6 +190,11 @@ impl Client {
     /// Cleared if they may have changed.
     pub(crate) fn known(&self) -> MutexGuard<'_, Known> {
         self.port.known.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Ids of the work of all handles; dropped work may be among them.
+    pub(crate) fn works(&self) -> MutexGuard<'_, Vec<(u32, Weak<()>)>> {
+        self.port.works.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     pub fn hello(&self) -> &Hello {

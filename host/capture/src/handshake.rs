@@ -51,11 +51,7 @@ fn say_hello(
         // Skipped events are not lost: the following status has their number.
         match link.ask((PROTOCOL_CURRENT, 0), &Request::Hello, &waits, DURING, &mut |_| Ok(())) {
             Ok((_, packet)) => return Ok(packet),
-            Err(error @ ClientError::Silent { .. }) => {
-                silent = Some(both(silent, error));
-                // Equal bytes at the next rate: a slow board recognises the repeat.
-                link.reuse_id();
-            }
+            Err(error @ ClientError::Silent { .. }) => silent = Some(both(silent, error)),
             Err(error) => return Err(error),
         }
     }

@@ -17,6 +17,8 @@ use farnear_protocol::{
 
 use crate::{error::ClientError, owner::nothing, transport::Transport};
 
+/// Beyond the ids of any session, so that a late answer to an ended program is not taken for hello's.
+const HELLO_ID: u32 = 1 << 31;
 /// Silence after which no older answer is in transit.
 const QUIET: Duration = Duration::from_millis(5);
 /// Longest wait for silence.
@@ -87,10 +89,6 @@ impl Link {
         self.next_id = last_id.wrapping_add(1);
     }
 
-    pub(crate) fn reuse_id(&mut self) {
-        self.next_id = self.next_id.wrapping_sub(1).max(1);
-    }
-
     /// Continues over a new transport, at the rate of a board after reset.
     pub(crate) fn replace(&mut self, transport: Box<dyn Transport>) {
         if let Some(port) = transport.port() {
@@ -159,10 +157,14 @@ impl Link {
         request: &Request,
         during: &str,
     ) -> Result<Asked, ClientError> {
-        let id = self.next_id;
-        self.next_id = self.next_id.wrapping_add(1).max(1);
+        let (id, session) = if *request == Request::Hello {
+            (HELLO_ID, NO_SESSION) // equal bytes at each rate: a slow board recognises the repeat
+        } else {
+            let id = self.next_id;
+            self.next_id = id.wrapping_add(1).max(1);
+            (id, self.session)
+        };
         let header = Header { version, kind: Kind::Request, id, boot };
-        let session = if *request == Request::Hello { NO_SESSION } else { self.session };
         let frame = encode(header, &Call { session, request: request.clone() }).ok_or_else(|| {
             ClientError::Nonsense { during: during.into(), answer: "the request does not fit a frame".into() }
         })?;

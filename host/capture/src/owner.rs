@@ -209,7 +209,14 @@ impl Owner {
             questions.iter().map(|question| (&question.request, question.during.as_str())).collect();
         let answered = match self.ask_all(&asked) {
             Ok(answered) => answered,
-            Err(error) => return vec![Err(error)],
+            Err(error) => {
+                let starts = questions.iter().any(|question| question.listener.is_some());
+                if starts && matches!(error, ClientError::Silent { .. }) {
+                    // The board may have begun it.
+                    let _ = self.ask(&Request::Stop, "stopping");
+                }
+                return vec![Err(error)];
+            }
         };
         let mut abandoned = false;
         for (question, answered) in questions.into_iter().zip(&answered) {

@@ -40,6 +40,27 @@ impl Client {
         }
     }
 
+    /// Repeats what the board refuses because of work that no handle has: its program has ended, or its start was not
+    /// answered. That work is stopped first.
+    pub(crate) fn after_lost_work<T>(
+        &self,
+        act: impl Fn() -> Result<T, ClientError>,
+    ) -> Result<T, ClientError> {
+        let error = match act() {
+            Err(error) => error,
+            done => return done,
+        };
+        let ClientError::Refused { error: RequestError::Busy { request }, .. } = error else {
+            return Err(error);
+        };
+        if self.works().iter().any(|(id, held)| *id == request && held.strong_count() > 0) {
+            return Err(error);
+        }
+        self.stop()?;
+        self.wait_until_it_stands()?;
+        act()
+    }
+
     /// Switches both light outputs for `time`, at most 60 s. `Client::keep_alive` without a request ends it.
     pub fn set_lights(&self, levels: LightLevels, time: Micros) -> Result<(), ClientError> {
         let request = Request::SetLights { levels, time, silence: self.keep_alive() };

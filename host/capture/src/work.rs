@@ -235,11 +235,15 @@ impl Client {
         during: String,
     ) -> Result<Work, ClientError> {
         let name = during.clone();
-        only(self.start_together(vec![Plan { request: request.clone(), work, during }])?, &name)
+        only(self.start_together(&[Plan { request: request.clone(), work, during }])?, &name)
     }
 
     /// Starts several works simultaneously. If one is refused, the others are stopped.
-    fn start_together(&self, plans: Vec<Plan>) -> Result<Vec<Work>, ClientError> {
+    fn start_together(&self, plans: &[Plan]) -> Result<Vec<Work>, ClientError> {
+        self.after_lost_work(|| self.start_once(plans))
+    }
+
+    fn start_once(&self, plans: &[Plan]) -> Result<Vec<Work>, ClientError> {
         if plans.is_empty() {
             return Ok(Vec::new());
         }
@@ -248,7 +252,7 @@ impl Client {
             return Err(ClientError::Interrupted { during, stopped: true });
         }
         let (mut questions, mut ends) = (Vec::new(), Vec::new());
-        for plan in &plans {
+        for plan in plans {
             let ((messages, receiver), held) = (channel(), Arc::new(()));
             let bears_loss = matches!(plan.request, Request::RunContinuously { .. });
             let listener = Listener { messages, held: Arc::downgrade(&held), bears_loss };
@@ -258,15 +262,18 @@ impl Client {
         }
         let answered = self.ask_together(questions, &during)?;
         let (mut started, mut refused) = (Vec::new(), None);
-        for ((plan, answered), (messages, held)) in plans.into_iter().zip(answered).zip(ends) {
+        for ((plan, answered), (messages, held)) in plans.iter().zip(answered).zip(ends) {
             match answered {
                 Ok((id, Response::Accepted)) => {
                     let allowed = self.timing().allowance(plan.work);
+                    let mut works = self.works();
+                    works.retain(|(_, held)| held.strong_count() > 0);
+                    works.push((id, Arc::downgrade(&held)));
                     started.push(Work {
                         client: self.clone(),
                         id,
-                        request: plan.request,
-                        during: plan.during,
+                        request: plan.request.clone(),
+                        during: plan.during.clone(),
                         messages,
                         _held: held,
                         allowed,
@@ -314,7 +321,7 @@ impl Client {
                 during: format!("homing the {}", axis_name(*axis)),
             })
         };
-        self.start_together(axes.iter().map(plan).collect::<Result<_, ClientError>>()?)
+        self.start_together(&axes.iter().map(plan).collect::<Result<Vec<_>, ClientError>>()?)
     }
 
     pub fn start_home(&self, axis: Axis) -> Result<Work, ClientError> {
@@ -336,7 +343,7 @@ impl Client {
                 during: format!("moving the {} to {:.3} um", axis_name(axis), um(target)),
             })
         };
-        self.start_together(targets.iter().map(plan).collect::<Result<_, ClientError>>()?)
+        self.start_together(&targets.iter().map(plan).collect::<Result<Vec<_>, ClientError>>()?)
     }
 
     pub fn start_move(&self, axis: Axis, target: Nanometres) -> Result<Work, ClientError> {
@@ -368,6 +375,10 @@ impl Client {
         let Some(count) = u8::try_from(shots.len()).ok().filter(|count| *count <= max) else {
             return Err(ClientError::TooManyShots { shots: shots.len(), max });
         };
+        self.after_lost_work(|| self.arm_once(shots, count))
+    }
+
+    fn arm_once(&self, shots: &[Shot], count: u8) -> Result<(), ClientError> {
         for (index, shot) in (0..count).zip(shots) {
             let request = Request::LoadShot { index, shot: *shot };
             self.expect_accepted(&request, &format!("loading shot {index}"))?;

@@ -176,6 +176,13 @@ impl Optics {
         self.focal_length_mm + self.focal_length_mm * self.focal_length_mm / (offset + slope * alpha)
     }
 
+    /// `[far, near]` object distances in mm at `-alpha` and `alpha`. The far one is infinite where the image would be nearer to the
+    /// lens than that of an object at infinity: `depth_mm` turns negative there.
+    pub fn range_mm(&self, alpha: f64) -> [f64; 2] {
+        let [far_mm, near_mm] = [-alpha, alpha].map(|alpha| self.depth_mm(alpha));
+        [if far_mm < self.focal_length_mm { f64::INFINITY } else { far_mm }, near_mm]
+    }
+
     /// Normalised depth of an object at `depth_mm`; NaN at or inside the focal length.
     pub fn alpha(&self, depth_mm: f64) -> f64 {
         if depth_mm <= self.focal_length_mm {
@@ -252,6 +259,20 @@ mod tests {
         assert_eq!(optics.unbinned(), optics);
         let learned = optics.binned(4).with_stage(Stage::identity(4, 2));
         assert_eq!(learned.unbinned(), optics);
+    }
+
+    #[test]
+    fn a_range_beyond_a_distant_focus_reaches_infinity() {
+        let mut file = rig();
+        file.focus = FocusSection { far_mm: 933.0, max_blur_px: None, near_mm: Some(886.81) };
+        let optics = file.check().unwrap();
+        assert_eq!(optics.range_mm(1.1), [optics.depth_mm(-1.1), optics.depth_mm(1.1)]);
+        // With a far focus of more than some 21 near ones, a tenth beyond it lies beyond infinity.
+        file.focus = FocusSection { far_mm: 30_000.0, max_blur_px: None, near_mm: Some(1000.0) };
+        let optics = file.check().unwrap();
+        let [far_mm, near_mm] = optics.range_mm(1.1);
+        assert!(far_mm == f64::INFINITY && optics.depth_mm(-1.1) < 0.0, "{far_mm}");
+        assert!((900.0..1000.0).contains(&near_mm), "{near_mm}");
     }
 
     #[test]

@@ -171,7 +171,7 @@ pub fn lost_pixels(reasons: &Array2<u8>) -> Vec<Lost> {
 }
 
 fn range(optics: &Optics) -> Believed {
-    let [far_mm, near_mm] = [-LARGEST_ALPHA, LARGEST_ALPHA].map(|alpha| optics.depth_mm(alpha) as f32);
+    let [far_mm, near_mm] = optics.range_mm(LARGEST_ALPHA).map(|mm| mm as f32);
     Believed {
         far_mm,
         near_mm,

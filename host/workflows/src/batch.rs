@@ -8,6 +8,7 @@ mod fields;
 mod generate;
 mod jobs;
 mod manifest;
+mod order;
 mod outs;
 mod place;
 mod provenance;
@@ -34,6 +35,7 @@ pub use self::{
 use self::{
     fields::Fields,
     manifest::{Entry, Manifest},
+    order::{Running, Turn},
     outs::{Outs, are_same},
     place::{Found, Place},
     provenance::{Provenance, Sums},
@@ -210,6 +212,7 @@ pub fn run(
         outs,
         base: settings.manifest.parent().unwrap_or(Path::new("")).to_path_buf(),
         manifest: Mutex::new(Manifest::open(&settings.manifest)?),
+        running: Running::default(),
         sums: Sums::default(),
         cache: Arc::clone(&context.cache),
         tally: &tally,
@@ -258,6 +261,7 @@ struct Work<'a> {
     outs: Outs,
     base: PathBuf,
     manifest: Mutex<Manifest>,
+    running: Running,
     sums: Sums,
     cache: Arc<Cache>,
     tally: &'a Tally<'a>,
@@ -287,8 +291,8 @@ impl Work<'_> {
     fn until_the_end(&self) -> Result<()> {
         while !self.cancel.is_cancelled() && !self.stop.is_cancelled() {
             let next = self.next();
-            let done = next.and_then(|entry| match entry {
-                Some(entry) => self.do_one(entry).map(|()| true),
+            let done = next.and_then(|next| match next {
+                Some((entry, _turn)) => self.do_one(entry).map(|()| true),
                 None => Ok(false),
             });
             match done {
@@ -303,11 +307,12 @@ impl Work<'_> {
         Ok(())
     }
 
-    fn next(&self) -> Result<Option<Entry>> {
+    fn next(&self) -> Result<Option<(Entry, Turn<'_>)>> {
         let mut manifest = self.manifest.lock().unwrap_or_else(PoisonError::into_inner);
         while let Some(entry) = manifest.next()? {
             if self.settings.shard.has(entry.number) {
-                return Ok(Some(entry));
+                let turn = self.running.begin(entry.line);
+                return Ok(Some((entry, turn)));
             }
         }
         Ok(None)
@@ -329,7 +334,7 @@ impl Work<'_> {
         let ours = refused.is_none();
         let ended = match unreadable.or(refused) {
             Some(error) => Err(error.into()),
-            None => self.job(&kind, &fields, &context),
+            None => self.job(line, &kind, &fields, &context),
         };
         let (state, figures, error) = match ended {
             Ok((state, figures)) => (state, figures, None),
@@ -358,11 +363,25 @@ impl Work<'_> {
         let _ = place.discard();
     }
 
-    fn job(&self, kind: &str, fields: &Fields, context: &Context<'_>) -> Result<(State, Option<Value>)> {
+    fn job(
+        &self,
+        line: usize,
+        kind: &str,
+        fields: &Fields,
+        context: &Context<'_>,
+    ) -> Result<(State, Option<Value>)> {
         let kind = jobs::kind(kind)?;
         jobs::check_outputs(kind, fields)?;
         let out = fields.base().join(fields.text("out")?);
         let work = (kind.job)(fields.all(), fields.base())?;
+        for path in work.inputs() {
+            match self.outs.maker_of(&path, line)? {
+                Some(maker) if maker > line => return Err(BatchError::Order { path, line: maker }.into()),
+                Some(_) if self.settings.dry_run && !path.exists() => return Ok((State::Todo, None)),
+                Some(maker) => self.running.wait_for(maker),
+                None => {}
+            }
+        }
         let input = self.sums.of(&work.inputs(), &self.base, &|path: &Path| self.outs.makes(path))?;
         let wanted = Provenance::new(kind.name, fields, input);
         let place = Place::new(out, makes_file(kind));

@@ -1,5 +1,6 @@
 //! Optics of a rig or a pair, from `optics.toml` or a capture's record.
 
+mod advice;
 mod expected;
 mod task;
 

@@ -358,6 +358,10 @@ fn coerce(value: Value, property: &Value, schema: &Value) -> Value {
             Value::String(number.to_string())
         }
         single @ (Value::Number(_) | Value::Bool(_)) if accepts("array") => Value::Array(vec![single]),
+        Value::Array(parts) => Value::Array(match property.get("items") {
+            Some(item) => parts.into_iter().map(|part| coerce(part, item, schema)).collect(),
+            None => parts,
+        }),
         other => other,
     }
 }
@@ -376,6 +380,7 @@ mod tests {
     struct Sample {
         file: PathBuf,
         views: Vec<PathBuf>,
+        steps: Vec<f64>,
         psf: Option<String>,
         count: Option<NonZero<u32>>,
         share: f64,
@@ -423,6 +428,14 @@ mod tests {
         assert_eq!(request.views, [Path::new("/base/b"), Path::new("/c")]);
         assert_eq!(request.psf.as_deref(), Some("gaussian:k=0.4,n=1"));
         assert_eq!(request.inputs(), ["/base/a", "/base/b", "/c"].map(PathBuf::from));
+    }
+
+    #[test]
+    fn numbers_of_a_list_may_be_texts() {
+        for steps in [json!([1, 2.5]), json!(["1", "2.5"]), json!("1; 2.5")] {
+            let fields = json!({"file": "a", "steps": steps});
+            assert_eq!(read(fields, Paths::RelativeTo(Path::new(""))).expect("a request").steps, [1.0, 2.5]);
+        }
     }
 
     #[test]

@@ -14,7 +14,7 @@ use serde_with::{DisplayFromStr, serde_as};
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
-    figures::rounded,
+    figures::{rounded, rounded_for},
     optics::GivenOptics,
     parameters::within,
     request::{PathKind, Request},
@@ -218,7 +218,7 @@ pub fn print(settings: &TargetRequest, context: &Context<'_>) -> Result<TargetFi
     staging::write_file(&settings.out, &bytes)?;
     context.info(&format!("wrote {}; print it at its actual size", settings.out.display()));
     Ok(TargetFigures {
-        pixel_on_target_mm: rounded(pixel_mm, 4),
+        pixel_on_target_mm: rounded_for(pixel_mm, pixel_mm, 4),
         cell_mm: rounded(cell_mm, 4),
         cell_px: rounded(cell_px, 3),
         cell_dots: dots as u32,
@@ -240,6 +240,18 @@ mod tests {
         {
             assert!(text.parse::<Paper>().expect_err(text).contains(expected), "{text}");
         }
+    }
+
+    #[test]
+    fn a_pixel_of_a_macro_lens_keeps_its_digits() {
+        let folder = tempfile::tempdir().unwrap();
+        let optics = folder.path().join("optics.toml");
+        let text = "[lens]\nfocal_length_mm = 50.0\nf_number = 2.8\n[sensor]\npixel_um = 3.45\n\
+                    [focus]\nfar_mm = 60.0\nnear_mm = 59.995\n";
+        std::fs::write(&optics, text).unwrap();
+        let request = TargetRequest { optics, out: folder.path().join("target.pdf"), ..TargetRequest::default() };
+        let found = print(&request, &Context::unattended()).unwrap();
+        assert!((found.pixel_on_target_mm - 6.9e-4).abs() < 1e-9, "{found:?}");
     }
 
     #[test]

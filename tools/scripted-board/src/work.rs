@@ -39,6 +39,10 @@ impl Board {
     }
 
     pub(super) fn work(&mut self, id: u32, request: Request) {
+        if self.braking > 0 {
+            let request = self.active.as_ref().map_or(0, |(id, _)| *id);
+            return self.answer(id, Err(RequestError::Busy { request }));
+        }
         if let Some(error) = self.refusal(&request) {
             return self.answer(id, Err(error));
         }

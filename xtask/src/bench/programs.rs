@@ -116,16 +116,17 @@ fn page(labels: &[Label], figures: &[Value], runs: usize) -> String {
          `farnear depth` by its default method is compared with a numpy + OpenCV script that reads, registers, computes and \
          writes ([`program_opencv.py`](../host/depth/benches/program_opencv.py), one thread, a fixed window, no uncertainty). \
          The script writes depth and a coloured picture; `farnear depth` writes all its default outputs, or depth.npy only. A ratio \
-         below 1 means that farnear uses less CPU time. A shifted pair needs registration; an aligned pair skips it.\n\n\
-         | pair | outputs | CPU s, 1 thread | CPU s, 2 threads | script, CPU s | ratio, 1 thread | ratio of user time | wall / CPU, 2 threads | memory MiB | script, memory MiB |\n\
-         |---|---|--:|--:|--:|--:|--:|--:|--:|--:|\n",
+         below 1 means that farnear uses less CPU time. A shifted pair needs registration; an aligned pair skips it. User time leaves out the kernel's, most of which \
+         provides memory, and varies with the computer.\n\n\
+         | pair | outputs | CPU s, 1 thread | CPU s, 2 threads | script, CPU s | ratio, 1 thread | ratio of user time | user ns per pixel | wall / CPU, 2 threads | memory MiB | script, memory MiB |\n\
+         |---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
         processor(),
     );
     for (([width, height], shift, npy_only), figures) in labels.iter().zip(figures) {
         let figure = |program: usize, name: &str| figures[program][name].as_f64().unwrap_or(f64::NAN);
         let _ = writeln!(
             text,
-            "| {width}x{height}{} | {} | {:.3} | {:.3} | {:.3} | {:.2} | {:.2} | {:.2} | {:.0} | {:.0} |",
+            "| {width}x{height}{} | {} | {:.3} | {:.3} | {:.3} | {:.2} | {:.2} | {:.0} | {:.2} | {:.0} | {:.0} |",
             if shift[0] == 0 { "" } else { ", shifted" },
             if *npy_only { "npy" } else { "all" },
             figure(0, "cpu_s"),
@@ -133,6 +134,7 @@ fn page(labels: &[Label], figures: &[Value], runs: usize) -> String {
             figure(2, "cpu_s"),
             figure(0, "cpu_s") / figure(2, "cpu_s"),
             figure(0, "user_s") / figure(2, "user_s"),
+            figure(0, "user_s") * 1e9 / (width * height) as f64,
             figure(1, "wall_s") / figure(1, "cpu_s"),
             figure(0, "memory_mib"),
             figure(2, "memory_mib"),
@@ -151,7 +153,8 @@ mod tests {
             |cpu: f64| json!({"cpu_s": cpu, "user_s": cpu / 2.0, "wall_s": cpu / 4.0, "memory_mib": 100.0});
         let figures = [json!([time(1.0), time(1.2), time(2.0)])];
         let page = page(&[([640, 480], SHIFT, true)], &figures, 5);
-        let row = "| 640x480, shifted | npy | 1.000 | 1.200 | 2.000 | 0.50 | 0.50 | 0.25 | 100 | 100 |";
+        let row =
+            "| 640x480, shifted | npy | 1.000 | 1.200 | 2.000 | 0.50 | 0.50 | 1628 | 0.25 | 100 | 100 |";
         assert!(page.contains(row), "{page}");
     }
 }

@@ -101,15 +101,19 @@ fn every_stop_ends_the_pulses_within_a_millisecond_and_is_latched() {
     }
 }
 
+/// Its third contact cuts the drivers' supply.
 #[test]
-fn a_stop_at_rest_keeps_the_position() {
-    let mut bench = Bench::homed();
+fn an_emergency_stop_at_rest_loses_the_position() {
+    let mut bench = Bench::both_homed();
     bench.hardware.faults.emergency_stop = true;
     bench.run_ms(5);
-    assert_eq!(bench.status().coarse.state, PositionState::Homed);
+    let status = bench.status();
+    assert_eq!((status.coarse.state, status.lens.state), (PositionState::Lost, PositionState::Lost));
     bench.hardware.faults.emergency_stop = false;
     bench.run_ms(1);
     bench.clear();
+    assert!(matches!(bench.ask(&go(Axis::SensorCoarse, 1_000_000)).1, Err(RequestError::NotHomed { .. })));
+    bench.work(&home(Axis::SensorCoarse));
     assert!(matches!(bench.work(&go(Axis::SensorCoarse, 1_000_000)), EventKind::MoveDone { .. }));
 }
 

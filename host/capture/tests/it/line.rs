@@ -56,6 +56,37 @@ fn ignores_stale_frames_of_an_earlier_program() {
 }
 
 #[test]
+fn hello_is_not_answered_by_a_late_answer_to_an_ended_program() {
+    /// The answer to the first session of the board's boot arrives with the first answer to this program.
+    struct Late {
+        line: Box<dyn Transport>,
+        peer: Peer,
+        arrived: bool,
+    }
+    impl Transport for Late {
+        fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> std::io::Result<usize> {
+            self.line.receive(buffer, wait)
+        }
+        fn send(&mut self, bytes: &[u8], wait: Duration) -> std::io::Result<()> {
+            if !std::mem::replace(&mut self.arrived, true) {
+                self.peer.board().put_stale(1, &Response::Accepted);
+            }
+            self.line.send(bytes, wait)
+        }
+        fn discard_input(&mut self) -> std::io::Result<()> {
+            self.line.discard_input()
+        }
+    }
+    let peer = Peer::new(Faults::default());
+    let mut connect = peer.connect();
+    let late = move || {
+        Ok(Box::new(Late { line: connect()?, peer: peer.clone(), arrived: false }) as Box<dyn Transport>)
+    };
+    let client = Client::connect(Box::new(late), "scripted").unwrap();
+    assert_eq!(client.hello().boot, 7);
+}
+
+#[test]
 fn an_answer_received_during_a_delay_is_not_requested_again() {
     /// Delivers one frame per read; each answer comes last, after an event.
     struct Late {

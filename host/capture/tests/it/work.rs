@@ -10,7 +10,7 @@ use std::{
 
 use farnear_capture::{ClientError, Step, Timing};
 use farnear_protocol::{
-    Request,
+    Request, RequestError,
     message::{Axis, EventKind, Shot, TriggerMode},
     units::{Micros, Nanometres},
 };
@@ -100,6 +100,38 @@ fn an_interruption_stops_the_rig() {
         (board.stops, board.braking)
     };
     assert_eq!((stops, braking), (1, 0), "reported at standstill");
+}
+
+#[test]
+fn work_begins_after_work_that_no_handle_has() {
+    let (client, peer) = connect(Faults { brakes_for: 3, ..Faults::default() });
+    peer.board().braking = 1_000; // of a program that was killed
+    client.home(Axis::SensorCoarse).unwrap();
+    let board = peer.board();
+    assert_eq!((board.stops, board.acts), (1, 1));
+}
+
+#[test]
+fn work_that_a_handle_has_is_not_stopped_for_other_work() {
+    let (client, peer) = connect(Faults { never_ends: true, ..Faults::default() });
+    let held = client.start_home(Axis::SensorCoarse).unwrap();
+    peer.board().braking = 1_000;
+    let error = client.start_home(Axis::Lens).err().unwrap();
+    let busy =
+        |error: &RequestError| matches!(error, RequestError::Busy { request } if *request == held.id());
+    assert!(matches!(&error, ClientError::Refused { error, .. } if busy(error)), "{error:?}");
+    assert_eq!(peer.board().stops, 0);
+}
+
+#[test]
+fn work_whose_start_is_not_answered_is_stopped() {
+    let (client, peer) = connect(Faults::default());
+    client.home(Axis::SensorCoarse).unwrap(); // reads the settings
+    peer.board().faults = Faults { never_ends: true, lose_answers: 4, ..Faults::default() };
+    let error = client.home(Axis::SensorCoarse).err().unwrap();
+    assert!(matches!(error, ClientError::Silent { attempts: 4, .. }), "{error:?}");
+    let board = peer.board();
+    assert_eq!((board.stops, board.acts), (1, 2));
 }
 
 #[test]

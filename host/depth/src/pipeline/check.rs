@@ -229,7 +229,7 @@ const CONFIDENT: f32 = 0.7;
 const TILT: f64 = 0.12;
 
 pub(crate) fn after(map: &DepthMap, optics: &Optics) -> Option<Warning> {
-    let [near_mm, far_mm] = [optics.depth_mm(1.1) as f32, optics.depth_mm(-1.1) as f32];
+    let [far_mm, near_mm] = optics.range_mm(1.1).map(|mm| mm as f32);
     let mut thirds: [Vec<f32>; 3] = Default::default();
     let sample = confidence::sample(map.depth_mm.dim());
     let [depths, confidences] = [map.depth_mm.slice(sample), map.confidence.slice(sample)];

@@ -144,6 +144,25 @@ fn depths_are_valid_a_tenth_beyond_either_focus() {
     assert_eq!(validity.valid_fraction, 0.5);
 }
 
+/// The far focus of a camera outdoors: a tenth beyond it lies beyond infinity, where depths are negative.
+#[test]
+fn depths_are_valid_up_to_infinity() {
+    let mut case = Case::new((1, 4));
+    let file: OpticsFile = toml::from_str(
+        "[lens]\nfocal_length_mm = 8.0\nf_number = 1.6\n[sensor]\npixel_um = 5.0\n[focus]\nfar_mm = 30000.0\nnear_mm = 1000.0\n",
+    )
+    .unwrap();
+    case.optics = file.check().unwrap();
+    let deviation_mm = 0.01 * case.slope_mm();
+    case.estimate.deviation_mm.fill(deviation_mm);
+    for (depth, alpha) in case.map.depth_mm.iter_mut().zip([-1.09, -1.0, 0.0, 1.11]) {
+        *depth = case.optics.depth_mm(alpha) as f32;
+    }
+    assert!(case.map.depth_mm[(0, 0)] < 0.0);
+    let out = Reason::OutOfRange.code();
+    assert_eq!(case.judged().1.reasons, ndarray::array![[out, 0, 0, out]]);
+}
+
 #[test]
 fn a_hole_has_the_reason_that_is_near_and_the_first_of_several() {
     let [saturated, moved, out] = [Reason::Saturated, Reason::Moved, Reason::OutOfRange].map(Reason::code);

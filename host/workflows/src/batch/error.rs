@@ -28,6 +28,8 @@ pub enum BatchError {
     Foreign { path: PathBuf },
     #[error("another batch is making {} now: run the batch again after it has ended", path.display())]
     InUse { path: PathBuf },
+    #[error("the input {} is the result of the job on line {line}: move this job behind that one", path.display())]
+    Order { path: PathBuf, line: usize },
     #[error("cannot write the {what} to {}: {reason}; name another file", path.display())]
     Report { what: &'static str, path: PathBuf, reason: String },
     #[error("{failed} of {jobs} jobs failed; {} says why; run the batch again to do them again", failures.display())]

@@ -80,13 +80,26 @@ pub fn generate(manifest: &Path, kind: &str, fields: &[Pattern]) -> Result<usize
     let header = std::iter::once(KIND).chain(fields.iter().map(|field| field.name.as_str()));
     writer.write_record(header).map_err(|error| unwritable(error.into()))?;
     for captured in &found {
-        let row =
-            std::iter::once(kind.to_owned()).chain(fields.iter().map(|field| filled(&field.value, captured)));
-        writer.write_record(row).map_err(|error| unwritable(error.into()))?;
+        let row: Vec<String> = std::iter::once(kind.to_owned())
+            .chain(fields.iter().map(|field| filled(&field.value, captured)))
+            .collect();
+        if let Some(cell) = row.iter().find(|cell| !survives(cell)) {
+            return Err(pattern(format!(
+                "the name {cell:?} would be another one in a CSV: expected UTF-8 without blanks at its ends and \
+                 without carriage returns; rename the file or its folder"
+            ))
+            .into());
+        }
+        writer.write_record(&row).map_err(|error| unwritable(error.into()))?;
     }
     let text = writer.into_inner().map_err(|error| unwritable(error.into_error()))?;
     write_file(manifest, &text)?;
     Ok(found.len())
+}
+
+/// Whether [`Manifest`](super::manifest::Manifest) reads the same text. Names that are not UTF-8 have a replacement character.
+fn survives(cell: &str) -> bool {
+    cell.trim() == cell && !cell.contains(['\r', char::REPLACEMENT_CHARACTER])
 }
 
 fn filled(value: &str, captured: &[String]) -> String {
@@ -172,6 +185,12 @@ mod tests {
         assert!(error("depth", &["far=a.png", "out=*"]).contains("more *"));
         assert!(error("dept", &["far=*"]).contains("dept"));
         assert!(error("depth", &["far=*", "out=a", "out=b"]).contains("`out` is given twice"));
+        fs::write(folder.path().join(" a.png"), "").unwrap();
+        assert!(error("depth", &["far=*.png"]).contains("\" a.png\" would be another one"));
+        assert!(survives("a b/ c\n;.png"));
+        for name in [" a", "b ", "c\r.png", "d\u{fffd}.png"] {
+            assert!(!survives(name), "{name:?}");
+        }
         assert!("far".parse::<Pattern>().is_err() && "=x".parse::<Pattern>().is_err());
     }
 }

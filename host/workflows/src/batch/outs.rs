@@ -49,6 +49,12 @@ impl Outs {
             .is_ok_and(|current| self.lines.contains_key(&self.hasher.hash_one(on_disk(&current, path))))
     }
 
+    /// Line of the job that makes `path`, or a folder around it, unless that is the job on `line`.
+    pub fn maker_of(&self, path: &Path, line: usize) -> Result<Option<usize>, BatchError> {
+        let place = on_disk(&current_folder()?, path);
+        Ok(self.maker(&place, Some(line)).map(|(maker, _)| maker))
+    }
+
     /// Checks that the job on `line` may make `out`: no earlier job makes it, and no job makes a folder around it.
     pub fn check(&self, line: usize, out: &str) -> Result<(), BatchError> {
         match self.maker(&on_disk(&self.base, out.as_ref()), Some(line)) {

@@ -1,7 +1,7 @@
 //! Progress of the jobs: reports, file of failures, remaining time.
 
 use std::{
-    fs::{self, File},
+    fs::{self, File, OpenOptions},
     io::{self, Write},
     path::{Path, PathBuf},
     sync::{Mutex, PoisonError},
@@ -91,14 +91,46 @@ impl<'a> Tally<'a> {
         let unwritable = |source| BatchError::Write { path: path.clone(), source };
         let file = match file {
             Some(file) => file,
-            None => file.insert(File::create(path).map_err(unwritable)?),
+            // Another run at the same time may write there, too.
+            None => file.insert(OpenOptions::new().create(true).append(true).open(path).map_err(unwritable)?),
         };
         let line = serde_json::to_string(report).map_err(|error| unwritable(error.into()))?;
-        writeln!(file, "{line}").map_err(unwritable)?;
+        // One write, which the system does not split.
+        file.write_all(format!("{line}\n").as_bytes()).map_err(unwritable)?;
         Ok(())
     }
 
     pub fn end(&self) -> BatchFigures {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner).figures.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_runs_at_once_write_whole_lines() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("failures.jsonl");
+        let (context, on_job) = (Context::unattended(), |_: &JobReport| -> io::Result<()> { Ok(()) });
+        let tally = || Tally::new(2, Some(&path), &context, &on_job).expect("a writable folder");
+        let (one, other) = (tally(), tally());
+        for (tally, job, error) in [(&one, 1, "a long reason"), (&other, 1, "short"), (&one, 2, "short")] {
+            let report = JobReport {
+                job,
+                line: job,
+                kind: "depth".into(),
+                out: None,
+                state: State::Failed,
+                seconds: 0.0,
+                figures: None,
+                warnings: Vec::new(),
+                error: Some(error.into()),
+            };
+            tally.tell(&report).expect("a writable file");
+        }
+        let text = fs::read_to_string(&path).expect("failures");
+        assert_eq!(text.lines().filter(|line| Tally::begins(line)).count(), 3, "{text}");
     }
 }

@@ -11,7 +11,11 @@ use farnear_files::staging::write_file;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{GivenOptics, expected::expected_error};
+use super::{
+    GivenOptics,
+    advice::{AIRY_UM, BEST_BLUR_PX, USABLE_BLUR_PX, advice},
+    expected::expected_error,
+};
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
@@ -20,17 +24,12 @@ use crate::{
     request::{PathKind, Request},
 };
 
-/// Usable range of the largest blur radius, px, and its target.
-const USABLE_BLUR_PX: [f64; 2] = [2.0, 4.0];
-const BEST_BLUR_PX: f64 = 2.7;
 const FOCAL_LENGTHS_MM: [f64; 14] =
     [8.0, 12.0, 16.0, 25.0, 35.0, 50.0, 75.0, 85.0, 100.0, 135.0, 150.0, 180.0, 200.0, 300.0];
 const STOPS: [f64; 6] = [1.4, 2.0, 2.8, 4.0, 5.6, 8.0];
 const BINNINGS: [usize; 4] = [1, 2, 4, 8];
 /// Closest focus of these lenses, in focal lengths.
 const NEAREST_FOCUS: f64 = 3.0;
-/// Radius of the Airy disc per f-number at 550 nm.
-const AIRY_UM: f64 = 0.67;
 const AVERAGED_MAX: f64 = 64.0;
 
 /// Print what a pair can measure: working range, blur, expected error, and what to change; or propose optics.
@@ -113,6 +112,17 @@ impl Request for OpticsRequest {
             let expected = "a part of the mean brightness, at most 1: 0.2 is 20 %";
             return Err(WorkflowError::parameter("contrast", self.contrast, expected));
         }
+        let of_proposal = [
+            ("range-mm", self.range_mm.is_some()),
+            ("error-mm", self.error_mm.is_some()),
+            ("focal-length-mm", self.focal_length_mm.is_some()),
+            ("out", self.out.is_some()),
+        ];
+        let useless = of_proposal.into_iter().find(|(_, given)| self.optics.is_some() && *given);
+        if let Some((name, _)) = useless {
+            let expected = "it belongs to a proposal: expected distance-mm instead of optics";
+            return Err(WorkflowError::parameter(name, "(given)", expected));
+        }
         match (&self.optics, self.distance_mm, self.range_mm) {
             (Some(_), None, _) => Ok(()),
             (None, Some(distance), Some(range)) if range < distance => Ok(()),
@@ -177,7 +187,9 @@ pub struct OpticsFigures {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub averaged_exposures: Option<usize>,
     pub max_blur_px: f64,
-    pub farthest_usable_mm: f64,
+    /// Absent where it is infinite.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub farthest_usable_mm: Option<f64>,
     pub nearest_usable_mm: f64,
     /// Side of a pixel at the object at mid-range.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -199,7 +211,7 @@ fn figures(optics: &Optics, binning: usize, contrast: f64, accepted_mm: Option<f
     let error = expected_error(optics, contrast, binning);
     let span_mm = range.far_mm - range.near_mm;
     let estimate = |mm: f64| Some(rounded_for(mm, mm, 4)).filter(|mm| *mm < span_mm);
-    let limit = |alpha: f64| rounded_for(span_mm, optics.depth_mm(alpha), 3);
+    let [farthest_mm, nearest_mm] = optics.range_mm(LARGEST_ALPHA).map(|mm| rounded_for(span_mm, mm, 3));
     let pixel_mm = optics.pixel_um() * 1e-3 * (range.alpha0_mm / optics.focal_length_mm() - 1.0);
     let mut advice = advice(optics);
     let averaged = accepted_mm.map(|accepted| (error.whitened_mm / accepted).powi(2).ceil().max(1.0));
@@ -227,68 +239,13 @@ fn figures(optics: &Optics, binning: usize, contrast: f64, accepted_mm: Option<f
         binning: accepted_mm.map(|_| binning),
         averaged_exposures: averaged.map(|count| count as usize),
         max_blur_px: rounded(optics.max_blur_px(), 3),
-        farthest_usable_mm: limit(-LARGEST_ALPHA),
-        nearest_usable_mm: limit(LARGEST_ALPHA),
+        farthest_usable_mm: farthest_mm.is_finite().then_some(farthest_mm),
+        nearest_usable_mm: nearest_mm,
         pixel_at_object_mm: scaled(rounded_for(pixel_mm, pixel_mm, 4)),
         advice,
         expected_error_ro_mm: estimate(error.ro_mm),
         expected_error_whitened_mm: estimate(error.whitened_mm),
     }
-}
-
-fn advice(optics: &Optics) -> Vec<String> {
-    // Focal length, f-number and pixel of a learned lens are assumed ones.
-    let (blur, learned) = (optics.max_blur_px(), optics.stage().is_some());
-    let range = optics.working_range();
-    let distance = |mm: f64| rounded_for(range.far_mm - range.near_mm, mm, 2);
-    let [least, most] = USABLE_BLUR_PX;
-    let mut advice = Vec::new();
-    if blur > most {
-        let binning = (blur / BEST_BLUR_PX).round().max(2.0);
-        let f_number = optics.f_number() * blur / BEST_BLUR_PX;
-        let near = of_blur(optics, BEST_BLUR_PX).map_or(String::new(), |near| {
-            format!(
-                ", or focus the near image at {} mm instead of {} mm",
-                distance(near),
-                distance(range.near_mm)
-            )
-        });
-        let stop = if !learned && f_number <= 22.0 {
-            format!(", stop down to f/{f_number:.1}")
-        } else {
-            String::new()
-        };
-        advice.push(format!(
-            "the largest blur radius is {blur:.1} px, usable is {least} to {most} px: bin {binning} x {binning} pixels{stop}{near}"
-        ));
-    } else if blur < least {
-        let f_number = optics.f_number() * blur / BEST_BLUR_PX;
-        let near = of_blur(optics, BEST_BLUR_PX)
-            .map_or(String::new(), |near| format!(", or focus the near image at {} mm", distance(near)));
-        let stop = if learned {
-            "open the aperture".into()
-        } else if f_number >= 0.95 {
-            format!("open the aperture to f/{f_number:.1}")
-        } else {
-            "use a longer lens".into()
-        };
-        advice.push(format!(
-            "the largest blur radius is {blur:.2} px, usable is {least} to {most} px: {stop}{near}"
-        ));
-    }
-    let airy_px = AIRY_UM * optics.f_number() / optics.pixel_um();
-    if !learned && airy_px > 0.7 * blur {
-        advice.push(format!(
-            "diffraction blurs by {airy_px:.1} px, as much as defocus does: open the aperture or use larger pixels"
-        ));
-    }
-    advice
-}
-
-fn of_blur(optics: &Optics, blur_px: f64) -> Option<f64> {
-    let mut file = OpticsFile::from(*optics);
-    file.focus = FocusSection { max_blur_px: Some(blur_px), near_mm: None, ..file.focus };
-    file.check().ok().map(|optics| optics.working_range().near_mm)
 }
 
 fn propose(request: &OpticsRequest) -> Result<(Optics, OpticsFigures)> {
@@ -358,7 +315,15 @@ fn propose(request: &OpticsRequest) -> Result<(Optics, OpticsFigures)> {
         );
         return Err(WorkflowError::parameter("error-mm", accepted, expected));
     }
-    let found = figures(&optics, binning, request.contrast, Some(accepted));
+    let mut found = figures(&optics, binning, request.contrast, Some(accepted));
+    if binning > 1 {
+        found.advice.push(format!(
+            "the optics are of averages of {binning} x {binning} pixels: let the camera average them; for whole images set pixel_um = {} and \
+             max_blur_px = {:.4}, and give depth --bin {binning}",
+            request.pixel_um,
+            optics.max_blur_px() * binning as f64
+        ));
+    }
     Ok((optics, found))
 }
 
@@ -401,6 +366,24 @@ mod tests {
     }
 
     #[test]
+    fn a_distant_focus_has_no_farthest_depth() {
+        let text = "[lens]\nfocal_length_mm = 8.0\nf_number = 1.6\n[sensor]\npixel_um = 5.0\n\
+                    [focus]\nfar_mm = 30000.0\nnear_mm = 1000.0\n";
+        let optics = toml::from_str::<OpticsFile>(text).unwrap().check().unwrap();
+        let found = figures(&optics, 1, 0.2, None);
+        assert_eq!((found.farthest_usable_mm, found.nearest_usable_mm), (None, 954.3), "{found:?}");
+        assert!(figures(&rig(2.703), 1, 0.2, None).farthest_usable_mm.is_some());
+    }
+
+    #[test]
+    fn parameters_of_a_proposal_are_refused_with_an_optics_file() {
+        let request = OpticsRequest { optics: Some("optics.toml".into()), ..OpticsRequest::default() };
+        assert!(request.check().is_ok());
+        let error = OpticsRequest { out: Some("new.toml".into()), ..request }.check().unwrap_err();
+        assert!(error.is_usage() && error.to_string().contains("distance-mm"), "{error}");
+    }
+
+    #[test]
     fn states_no_error_where_the_blur_leaves_no_depth() {
         let found = figures(&rig(133.0), 1, 0.2, None);
         assert_eq!((found.expected_error_ro_mm, found.expected_error_whitened_mm), (None, None));
@@ -414,23 +397,10 @@ mod tests {
                     [focus]\nfar_mm = 6.5845\nnear_mm = 6.5839\n";
         let optics: Optics = toml::from_str::<OpticsFile>(text).unwrap().check().unwrap();
         let found = figures(&optics, 1, 0.2, None);
-        assert!(found.farthest_usable_mm > 6.5845 && found.nearest_usable_mm < 6.5839, "{found:?}");
+        assert!(found.farthest_usable_mm.unwrap() > 6.5845 && found.nearest_usable_mm < 6.5839, "{found:?}");
         assert!((found.pixel_at_object_mm.unwrap() - 6.48e-5).abs() < 1e-7, "{found:?}");
         let error = expected_error(&optics, 0.2, 1).whitened_mm;
         assert!((found.expected_error_whitened_mm.unwrap() / error - 1.0).abs() < 1e-3, "{found:?} {error}");
-    }
-
-    #[test]
-    fn advice_brings_the_blur_into_the_usable_range() {
-        assert!(advice(&rig(2.703)).is_empty());
-        let text = advice(&rig(133.0)).join("; ");
-        assert!(
-            text.contains("133.0 px") && text.contains("bin 49 x 49") && text.contains("near image at"),
-            "{text}"
-        );
-        let wide = of_blur(&rig(133.0), BEST_BLUR_PX).unwrap();
-        assert!((wide - rig(BEST_BLUR_PX).working_range().near_mm).abs() < 1e-9);
-        assert!(advice(&rig(0.5)).join("; ").contains("open the aperture"));
     }
 
     #[test]

@@ -12,7 +12,10 @@ use farnear_depth::{
     focus_measure::FocusMeasure,
     optics::{Optics, OpticsFile},
 };
-use farnear_protocol::{Nanometres, message::Axis};
+use farnear_protocol::{
+    Nanometres,
+    message::{Axis, AxisStatus},
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_with::{DisplayFromStr, serde_as};
@@ -54,7 +57,7 @@ pub struct FocusRequest {
     /// The optics file; the search begins at its far focus.
     #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub optics: PathBuf,
-    /// Begin at this sensor distance [default: the place of the stage, or the optics' far focus if it had to be homed].
+    /// Begin at this sensor distance [default: the place of the stage, or the optics' far focus after homing].
     #[cfg_attr(feature = "clap", arg(long, value_name = "MM"))]
     pub start_mm: Option<f64>,
     /// Largest distance of the focus from the start.
@@ -139,8 +142,10 @@ pub(super) fn search(
     context: &Context<'_>,
 ) -> Result<Focus> {
     let client = &rig.rig.client;
-    let was_homed = ensure_ready(client, context)?;
-    let default = (!was_homed).then_some(optics.working_range().sensor_far_mm);
+    let before = client.status()?.coarse;
+    ensure_homed(client, &mut |what| context.info(what))?;
+    let placed = is_placed(before, client.status()?.coarse);
+    let default = (!placed).then_some(optics.working_range().sensor_far_mm);
     if let Some(start_mm) = settings.start_mm.or(default) {
         begin_at(client, start_mm, context)?;
     }
@@ -154,11 +159,9 @@ pub(super) fn search(
     Ok(find_focus(client, rig.camera.as_mut(), optics, &search, &mut |what| context.info(what))?)
 }
 
-/// Homes axes that are not homed; returns whether all were homed.
-fn ensure_ready(client: &Client, context: &Context<'_>) -> Result<bool> {
-    let before = client.status()?.coarse.state;
-    ensure_homed(client, &mut |what| context.info(what))?;
-    Ok(before == client.status()?.coarse.state)
+/// Whether the stage was moved to its place. Homing leaves it at 0, also if the run that homed it was stopped.
+fn is_placed(before: AxisStatus, homed: AxisStatus) -> bool {
+    before.state == homed.state && homed.asked != Nanometres(0)
 }
 
 /// Moves the sensor to a distance from the lens, with the piezo at mid-range.
@@ -210,7 +213,21 @@ fn object_mm(focal_length_mm: f64, sensor_mm: f64) -> Result<f64> {
 
 #[cfg(test)]
 mod tests {
+    use farnear_protocol::message::PositionState;
+
     use super::*;
+
+    #[test]
+    fn a_stage_that_was_only_homed_is_not_placed() {
+        let stands = |state, nm| {
+            let position = Nanometres(nm);
+            AxisStatus { state, asked: position, measured: position, moving: false, request: None }
+        };
+        let (unknown, homed) = (PositionState::Unknown, PositionState::Homed);
+        assert!(!is_placed(stands(unknown, 7), stands(homed, 0)), "it had to be homed");
+        assert!(!is_placed(stands(homed, 0), stands(homed, 0)), "it was homed by the run before");
+        assert!(is_placed(stands(homed, 5_800_000), stands(homed, 5_800_000)));
+    }
 
     #[test]
     fn the_object_of_a_sharp_image_follows_from_the_lens_equation() {

@@ -34,6 +34,8 @@ use crate::{
 use doubts::{POOR_FIT, doubts};
 
 pub const CAMERA_FILE: &str = "the camera file";
+/// Pitch from which ray-cast people are split badly: a body is far from the upright plane that it is taken for.
+const STEEP_DEG: f64 = 50.0;
 
 /// Remove a person's shadow from masks, from the pose of the camera and the place of the sun, of a lamp, or a measured direction.
 ///
@@ -217,6 +219,14 @@ pub fn remove_from_masks(request: &ShadowRemoveRequest, context: &Context<'_>) -
     if let Some(Sun { elevation_deg, in_view: true, .. }) = sun {
         context.info(&format!(
             "the camera looks into the sun (elevation {elevation_deg:.1} deg): expect glare in the masks and shadows that come straight at it"
+        ));
+    }
+    let pitch_deg = camera.camera.pitch_deg;
+    if pitch_deg > STEEP_DEG {
+        context.progress.warn(&format!(
+            "{}: the camera looks down by {pitch_deg} deg: above {STEEP_DEG} deg much of a person is taken for shadow, or shadow for the \
+             person, often without a flag; check the masks",
+            request.camera.display()
         ));
     }
     let masks = masks::Sequence::open(&request.masks)?;

@@ -160,6 +160,24 @@ fn results_in_the_folder_of_the_input_are_not_inputs() {
 }
 
 #[test]
+fn a_job_that_reads_the_result_of_another_begins_after_it() {
+    let root = folder();
+    let chain = manifest(root.path(), &[("a", "one"), ("one", "two"), ("two/m1.png", "three")]);
+    let together = BatchSettings { jobs: 3, ..settings(&chain) };
+    assert_eq!(states(&run(&BatchSettings { dry_run: true, ..together.clone() }).unwrap()), [State::Todo; 3]);
+    assert_eq!(states(&run(&together).unwrap()), [State::Done; 3]);
+    assert_eq!(states(&run(&together).unwrap()), [State::Already; 3]);
+    fs::copy(root.path().join("b/m1.png"), root.path().join("a/m1.png")).unwrap();
+    assert_eq!(states(&run(&together).unwrap()), [State::Done; 3], "another picture");
+
+    let backwards = manifest(root.path(), &[("one", "two"), ("a", "one")]);
+    let reports = run(&settings(&backwards)).unwrap();
+    assert_eq!(states(&reports), [State::Failed, State::Already]);
+    let error = reports[0].error.as_deref().unwrap();
+    assert!(error.contains("line 10") && error.contains("move this job behind"), "{error}");
+}
+
+#[test]
 fn a_field_for_a_further_result_is_refused() {
     let root = folder();
     let path = manifest(root.path(), &[("a", "one")]);

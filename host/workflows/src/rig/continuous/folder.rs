@@ -90,10 +90,15 @@ impl Folder {
     }
 
     fn write(&mut self, row: &[u8]) -> io::Result<()> {
+        let path = self.path.join(ROWS);
         let rows = match &mut self.rows {
-            Some(rows) => rows,
+            Some(rows) => {
+                // The open file outlives its folder, which the next pair would make anew.
+                fs::metadata(&path)?;
+                rows
+            }
             none => {
-                let rows = none.insert(File::create_new(self.path.join(ROWS))?);
+                let rows = none.insert(File::create_new(&path)?);
                 rows.write_all(HEAD)?;
                 rows
             }
@@ -130,7 +135,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_folder_without_a_frame_is_removed() {
+    fn a_folder_without_a_frame_is_removed_and_a_moved_one_is_an_error() {
         let parent = tempfile::tempdir().unwrap();
         let out = parent.path().join("out");
         drop(Folder::begin(&out).unwrap());
@@ -141,6 +146,12 @@ mod tests {
         folder.note(&dropped).unwrap();
         drop(folder);
         assert_eq!(fs::read_to_string(out.join(ROWS)).unwrap().lines().count(), 1 + 2);
+
+        let mut folder = Folder::begin(&parent.path().join("moved")).unwrap();
+        folder.note(&dropped).unwrap();
+        fs::rename(folder.path(), parent.path().join("elsewhere")).unwrap();
+        let error = folder.note(&dropped).unwrap_err().to_string();
+        assert!(error.contains(ROWS), "{error}");
 
         let own = parent.path().join("own");
         fs::create_dir(&own).unwrap();

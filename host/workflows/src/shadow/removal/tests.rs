@@ -1,4 +1,5 @@
 use super::*;
+use crate::context::Heard;
 
 const CAMERA: &str = "[camera]\nheight_m = 1.5\nazimuth_deg = 0\nfocal_length_mm = 4.0\npixel_um = 6.0\n";
 
@@ -67,6 +68,22 @@ fn a_sun_that_sets_is_flagged_after_the_first_mask() {
     };
     let error = remove_from_masks(&late, &Context::unattended()).unwrap_err().to_string();
     assert!(error.starts_with("the sun stands at 1."), "{error}");
+}
+
+#[test]
+fn a_steep_camera_is_reported() {
+    for (pitch_deg, is_steep) in [(45.0, false), (65.0, true)] {
+        let folder = tempfile::tempdir().unwrap();
+        let camera = format!("{CAMERA}pitch_deg = {pitch_deg:?}\n");
+        let request = ShadowRemoveRequest {
+            shadow_direction: Some(0.0),
+            ..request(folder.path(), &camera, &[[180, 290, 360, 350]])
+        };
+        let heard = Heard::default();
+        remove_from_masks(&request, &heard.context()).unwrap();
+        let warned = heard.warnings().iter().any(|text| text.contains(&format!("down by {pitch_deg} deg")));
+        assert_eq!(warned, is_steep, "{:?}", heard.warnings());
+    }
 }
 
 #[test]
