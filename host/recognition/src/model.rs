@@ -191,6 +191,23 @@ impl Recogniser {
         Ok(Answer::of(answer.probabilities, outlier_score))
     }
 
+    /// Whether the model was trained on these views; for a model of one view, on any of them. `false` for a model without
+    /// training clips, and for the thesis' grid, where different clips have equal patterns. Fails as [`Self::recognise`].
+    pub fn has_learned(&self, views: &[Track]) -> Result<bool, ModelError> {
+        /// Of squared distances; patterns are about 1 long.
+        const ROUNDING: f32 = 1e-8;
+        self.check(views)?;
+        if self.patterns.is_empty() || matches!(self.space.pattern, Pattern::Thesis(_)) {
+            return Ok(false);
+        }
+        for group in self.groups(views) {
+            if self.distance(self.pattern(&group)?.view()) < ROUNDING {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
     /// Answers with some of the activities only, and measures the outlier score for these. Unknown names are ignored;
     /// an empty list restricts nothing.
     #[must_use]

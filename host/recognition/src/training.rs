@@ -207,6 +207,24 @@ mod tests {
     }
 
     #[test]
+    fn a_model_tells_the_clips_that_it_has_learned() {
+        let (clips, _) = copies(6, 1);
+        let space = SpaceSettings {
+            dimensions: 4,
+            pattern: PatternKind::Codebook(8),
+            residuals: 0,
+            ..SpaceSettings::default()
+        };
+        let settings = RecogniserSettings { space, ..RecogniserSettings::default() };
+        let model = Recogniser::train(&clips[..4], &settings).expect("trained");
+        let learned: Vec<bool> =
+            clips.iter().map(|clip| model.has_learned(&clip.views).expect("fits")).collect();
+        assert_eq!(learned, [true, true, true, true, false, false]);
+        let both = [clips[5].views[0].clone(), clips[0].views[0].clone()];
+        assert_eq!(model.has_learned(&both), Ok(true));
+    }
+
+    #[test]
     fn limits_of_a_single_subject_come_from_different_performances() {
         let (clips, numbers) = copies(20, 2);
         // A copy is at distance 0.

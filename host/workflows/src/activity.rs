@@ -3,6 +3,7 @@
 mod annotated_video;
 pub mod answer;
 mod confusion_picture;
+mod doubts;
 pub mod evaluate;
 pub mod evaluation;
 pub mod judging;

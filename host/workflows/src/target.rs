@@ -249,7 +249,8 @@ mod tests {
         let text = "[lens]\nfocal_length_mm = 50.0\nf_number = 2.8\n[sensor]\npixel_um = 3.45\n\
                     [focus]\nfar_mm = 60.0\nnear_mm = 59.995\n";
         std::fs::write(&optics, text).unwrap();
-        let request = TargetRequest { optics, out: folder.path().join("target.pdf"), ..TargetRequest::default() };
+        let request =
+            TargetRequest { optics, out: folder.path().join("target.pdf"), ..TargetRequest::default() };
         let found = print(&request, &Context::unattended()).unwrap();
         assert!((found.pixel_on_target_mm - 6.9e-4).abs() < 1e-9, "{found:?}");
     }

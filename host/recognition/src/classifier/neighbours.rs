@@ -55,12 +55,20 @@ impl Method for Neighbours {
     }
 }
 
-/// Votes of the `k` smallest (squared distance, class): 1 each, plus a small bonus that decides ties.
+/// Votes of the `k` smallest (squared distance, class): 1 each, plus a small bonus that decides ties. Every class has a
+/// trace of a vote, larger for nearer ones, which decides where answers are restricted to classes without votes.
 fn vote(mut distances: Vec<(f32, usize)>, classes: usize, k: usize) -> Vec<f32> {
     distances.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut votes = vec![0.0; classes];
-    for (rank, &(_, label)) in distances.iter().take(k.max(1)).enumerate() {
-        votes[label] += 1.0 + 1e-3 / (1.0 + rank as f32);
+    let mut seen = 0.0;
+    for (rank, &(_, label)) in distances.iter().enumerate() {
+        if votes[label] == 0.0 {
+            seen += 1.0;
+            votes[label] = 1e-6 / seen;
+        }
+        if rank < k.max(1) {
+            votes[label] += 1.0 + 1e-3 / (1.0 + rank as f32);
+        }
     }
     votes
 }
@@ -77,5 +85,12 @@ mod tests {
             |k| Neighbours::train(rows.view(), &[0, 1, 1, 0], 2, k).probabilities(array![0.4_f32].view());
         let (two, three) = (by(2), by(3));
         assert!(three[1] > three[0] && two[0] > two[1], "{three:?} {two:?}");
+    }
+
+    #[test]
+    fn classes_without_votes_are_ranked_by_their_nearest() {
+        let rows = array![[0.0_f32], [9.0], [5.0], [1.0]];
+        let found = Neighbours::train(rows.view(), &[0, 1, 2, 0], 3, 1).probabilities(array![0.4_f32].view());
+        assert!(found[0] > 0.9999 && found[2] > found[1] && found[1] > 0.0, "{found:?}");
     }
 }

@@ -42,10 +42,10 @@ impl Confusion {
         f64::from(right) / f64::from(of)
     }
 
-    /// Wilson's interval of the accuracy at 95 % (E. B. Wilson, JASA 22, 1927).
-    pub fn interval(&self) -> (f64, f64) {
-        let (right, of) = self.right_of();
-        wilson(right, of, 1.96)
+    /// Wilson's interval of the accuracy at 95 % (E. B. Wilson, JASA 22, 1927) for this number of independent
+    /// trials: fewer than the answers if several views of a clip count.
+    pub fn interval(&self, trials: u32) -> (f64, f64) {
+        wilson_of_share(self.accuracy(), trials, 1.96)
     }
 
     /// Markdown table in per cent of each truth, as the thesis' tables 9.1 to 9.3.
@@ -66,10 +66,15 @@ impl Confusion {
 
 /// Wilson's score interval of `right` of `of` at `z` standard deviations; (0, 1) without clips.
 pub fn wilson(right: u32, of: u32, z: f64) -> (f64, f64) {
+    wilson_of_share(f64::from(right) / f64::from(of), of, z)
+}
+
+/// [`wilson`] for a share of right answers, 0 to 1.
+pub fn wilson_of_share(share: f64, of: u32, z: f64) -> (f64, f64) {
     if of == 0 {
         return (0.0, 1.0);
     }
-    let (n, p) = (f64::from(of), f64::from(right) / f64::from(of));
+    let (n, p) = (f64::from(of), share);
     let centre = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
     let half = z / (1.0 + z * z / n) * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt();
     ((centre - half).max(0.0), (centre + half).min(1.0))
@@ -96,6 +101,10 @@ mod tests {
         matrix.count(0, 1);
         matrix.count(1, 1);
         assert_eq!(matrix.right_of(), (2, 3));
+        // Three views of one clip are one trial.
+        assert_eq!(matrix.interval(3), wilson(2, 3, 1.96));
+        assert_eq!(matrix.interval(1), wilson_of_share(2.0 / 3.0, 1, 1.96));
+        assert!(matrix.interval(1).0 < matrix.interval(3).0);
         assert!(matrix.to_markdown().contains("| walk | 50.0 | 50.0 |"));
     }
 }

@@ -75,8 +75,12 @@ pub fn open_set(
                 let (model, _) =
                     Recogniser::train_searched(&taught, &fixed, scaling, &Unwatched).map_err(of_model)?;
                 for clip in clips.iter().filter(|clip| half(clip) == tested) {
+                    let known = model.activities.contains(&clip.activity);
+                    // The half that trains may lack other activities, too.
+                    if !known && clip.activity != *left_out {
+                        continue;
+                    }
                     let score = model.recognise(&clip.views).map_err(of_model)?.outlier_score;
-                    let known = clip.activity != *left_out;
                     if known { scores.known.push(score) } else { scores.strange.push(score) }
                 }
             }
@@ -121,5 +125,50 @@ fn mean(rows: &[OpenSet]) -> OpenSet {
         strangers: rows.iter().map(|row| row.strangers).sum(),
         unknown_of_strangers: over(|row| row.unknown_of_strangers),
         auroc: over(|row| row.auroc),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::clip::Track;
+    use crate::embedding::descriptor::{ANGLES, CELLS};
+    use crate::space::{PatternKind, SpaceSettings};
+    use ndarray::Array2;
+    use rand::{Rng, SeedableRng};
+
+    #[test]
+    fn activities_that_the_training_half_lacks_are_not_known() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+        let mut clip = |subject: &str, activity: usize| {
+            let descriptors = Array2::from_shape_fn((10, ANGLES), |(frame, angle)| {
+                let waves = (activity + 2) as f32 * (angle as f32).to_radians();
+                0.35 + 0.1 * (waves + 0.3 * frame as f32).sin() + rng.random_range(-0.01..0.01_f32)
+            });
+            let view = Track { descriptors, cells: Array2::zeros((10, CELLS)), boxes: None, empty_frames: 0 };
+            let activity = ["star", "turn", "wave", "hop"][activity].to_owned();
+            Clip { subject: subject.into(), activity, views: vec![view] }
+        };
+        let mut clips = Vec::new();
+        for subject in ["a", "b", "c", "d"] {
+            for number in 0..15 {
+                clips.push(clip(subject, number % 3));
+            }
+        }
+        // Both in one half.
+        clips.extend(["a", "c"].map(|subject| clip(subject, 3)));
+        let space = SpaceSettings {
+            dimensions: 4,
+            pattern: PatternKind::Codebook(8),
+            residuals: 0,
+            ..SpaceSettings::default()
+        };
+        let experiment = Experiment::codebook(space);
+        let rows = open_set(&clips, |_| experiment.clone(), Scaling::default(), &Unwatched).expect("rows");
+        let counts = |name: &str| {
+            let row = rows.iter().find(|row| row.left_out.as_deref() == Some(name)).expect("a row");
+            (row.known, row.strangers)
+        };
+        assert_eq!((counts("star"), counts("hop")), ((40, 20), (60, 2)));
     }
 }

@@ -19,7 +19,7 @@ use farnear_silhouettes::mask::Mask;
 use serde::Serialize;
 
 use super::{
-    confusion_picture,
+    confusion_picture, doubts,
     evaluate::EvaluateRequest,
     method::Method,
     samples::{SCALING, Samples, SamplesError, are_full_frames},
@@ -37,10 +37,11 @@ const TIMINGS: usize = 3;
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct EvaluationFigures {
     pub accuracy: f64,
-    /// Wilson interval, 95 %.
+    /// Wilson interval, 95 %, for as many independent trials as there are clips.
     pub confidence_interval: [f64; 2],
     pub right: u32,
     pub answers: u32,
+    /// The views of a performance are one clip.
     pub clips: usize,
     pub subjects: usize,
     pub views: Views,
@@ -78,15 +79,17 @@ pub(super) fn evaluate(
     check_others(request)?;
     let method = request.method.method()?;
     method.announce(context);
-    let test = Samples::read(&request.samples, context)?;
+    let mut test = Samples::read(&request.samples, context)?;
     let train = request.train.as_deref().map(|path| Samples::read(path, context)).transpose()?;
+    doubts::warn(test.clips.iter().chain(train.iter().flat_map(|train| &train.clips)), context);
     let (frames, empty_frames, full_frames) = (test.frames, test.empty_frames, test.full_frames);
     let folders = test.folders.clone();
-    let Clips { views, mut test, train } = Clips::of(test, train, request.views)?;
     let not_known = match &train {
-        Some(train) => take_unknown(request, &mut test, train)?,
+        Some(train) => take_unknown(request, &mut test.clips, &train.clips)?,
         None => Vec::new(),
     };
+    let clips = test.clips.len();
+    let Clips { views, test, train } = Clips::of(test, train, request.views)?;
     if !not_known.is_empty() {
         context.progress.warn(&format!("not trained, so their clips do not count: {}", not_known.join(", ")));
     }
@@ -95,20 +98,28 @@ pub(super) fn evaluate(
         return Err(EvaluationError::Subjects(subjects.len()).into());
     }
     let learned = train.as_deref().unwrap_or(&test);
+    let untaught = doubts::untaught(&test, learned);
+    if !untaught.is_empty() {
+        context.progress.warn(&format!(
+            "{}: performed by one subject only, whose clips are counted as wrong: the others do not teach it; add clips of a \
+             second subject, or leave these out",
+            untaught.join(", ")
+        ));
+    }
     let self_training = if request.adapt { ROUNDS } else { 0 };
     let experiment = Experiment { align: request.align, self_training, ..method.experiment(full_frames)? };
     let outcome =
         train_on_others(learned, &test, &experiment, &[views], &training_progress::Folds::new(context));
     let outcome = training_progress::outcome(outcome, context, "evaluating")?;
     let confusion = if views == Views::Each { &outcome.each } else { &outcome.fused };
-    let (low, high) = confusion.interval();
+    let (low, high) = confusion.interval(clips as u32);
     let (right, answers) = confusion.right_of();
     let mut figures = EvaluationFigures {
         accuracy: rounded(confusion.accuracy(), 5),
         confidence_interval: [rounded(low, 5), rounded(high, 5)],
         right,
         answers,
-        clips: test.len(),
+        clips,
         subjects: subjects.len(),
         views,
         mode: method.name(),
@@ -146,6 +157,7 @@ pub(super) fn open_set(request: &EvaluateRequest, context: &Context<'_>) -> Resu
     // One setting for all rounds: a search in each would run dozens of times.
     let method = Method { search: false, ..request.method.method()? };
     let samples = Samples::read(&request.samples, context)?;
+    doubts::warn(samples.clips.iter(), context);
     let experiment = method.experiment(samples.full_frames)?;
     let found = open_set::open_set(
         &samples.fused()?,

@@ -7,7 +7,7 @@ use farnear_recognition::choice::Views;
 use farnear_recognition::clip::{Clip, Track};
 use farnear_recognition::evaluation::{
     calibration::{Reliability, area_under_roc},
-    confusion::{Confusion, wilson},
+    confusion::{Confusion, wilson_of_share},
 };
 use farnear_recognition::model::{Answer, Recogniser};
 use farnear_recognition::self_training::ROUNDS;
@@ -33,7 +33,7 @@ pub struct JudgingFigures {
     pub answers: u32,
     /// Share of correct answers among all activities of the model.
     pub accuracy: f64,
-    /// Wilson interval, 95 %.
+    /// Wilson interval, 95 %, for as many independent trials as there are clips; the views of a performance are one.
     pub confidence_interval: [f64; 2],
     pub accuracy_among: f64,
     pub confidence_interval_among: [f64; 2],
@@ -93,6 +93,7 @@ pub(super) fn judge(
         .transpose()?;
     let recogniser = adapted.as_ref().unwrap_or(recogniser);
     let judged = answers(recogniser, &samples.clips, fused, &name, context)?;
+    warn_of_learned(recogniser, &samples, context)?;
     let (known, strange): (Vec<Judged>, Vec<Judged>) =
         judged.into_iter().partition(|judged| activities.contains(&judged.truth));
     let mut among: Vec<String> = known.iter().map(|judged| judged.truth.clone()).collect();
@@ -132,6 +133,25 @@ fn check_views(asked: Option<Views>, of_model: usize) -> Result<()> {
         let expected =
             format!("expected fused: the model fuses {of_model} views and does not answer for one");
         return Err(WorkflowError::parameter("views", "each", expected));
+    }
+    Ok(())
+}
+
+/// Warns of clips that the model was trained on.
+pub(super) fn warn_of_learned(
+    recogniser: &Recogniser,
+    samples: &Samples,
+    context: &Context<'_>,
+) -> Result<()> {
+    let learned =
+        samples.clips.par_iter().map(|clip| recogniser.has_learned(&clip.views).map_err(WorkflowError::from));
+    let count = learned.collect::<Result<Vec<bool>>>()?.into_iter().filter(|learned| *learned).count();
+    if count > 0 {
+        context.progress.warn(&format!(
+            "{}: the model was trained on {count} of {} clips: figures of clips that it has seen say nothing about others",
+            samples.path.display(),
+            samples.clips.len()
+        ));
     }
     Ok(())
 }
@@ -215,12 +235,14 @@ fn figures(known: &[Judged], strange: &[Judged], among: &[String], not_known: Ve
         rounded(count as f64 / of.len().max(1) as f64, 4)
     };
     let answers = known.len() as u32;
-    let (low, high) = wilson(right, answers, 1.96);
-    let (low_among, high_among) = confusion.interval();
+    let accuracy = f64::from(right) / f64::from(answers);
+    let clips = known.iter().filter(|judged| judged.view == 1).count() as u32;
+    let (low, high) = wilson_of_share(accuracy, clips, 1.96);
+    let (low_among, high_among) = confusion.interval(clips);
     let any = !strange.is_empty();
     JudgingFigures {
         answers,
-        accuracy: rounded(f64::from(right) / f64::from(answers), 4),
+        accuracy: rounded(accuracy, 4),
         confidence_interval: [rounded(low, 4), rounded(high, 4)],
         accuracy_among: rounded(confusion.accuracy(), 4),
         confidence_interval_among: [rounded(low_among, 4), rounded(high_among, 4)],

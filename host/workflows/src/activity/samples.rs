@@ -123,7 +123,14 @@ fn record_opening(folder: &Path, path: &Path, reason: &str) -> Result<()> {
 
 fn listed(path: &Path) -> Result<File> {
     let text = fs::read_to_string(path).map_err(WorkflowError::read("the samples", path))?;
-    toml::from_str(&text).about(|| path.display().to_string())
+    let mut file: File = toml::from_str(&text).about(|| path.display().to_string())?;
+    for sample in &mut file.samples {
+        // A blank at the end of a name would make another person of the same one.
+        for name in [&mut sample.subject, &mut sample.activity] {
+            *name = name.trim().to_owned();
+        }
+    }
+    Ok(file)
 }
 
 /// The reason to open a set, if it is blind. Fails without one.
@@ -356,7 +363,7 @@ mod tests {
             sample("m5", "a", "walk", ""),
             sample("m7", "a", "walk", ""),
             sample("m9", "a", "dig", "clip = \"x\"\nview = 2\n"),
-            sample("m6", "a", "dig", "clip = \"x\"\n"),
+            sample("m6", "a ", " dig", "clip = \"x\"\n"),
         ];
         for width in 5..10 {
             write_masks(&folder.path().join(format!("m{width}")), width);

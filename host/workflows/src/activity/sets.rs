@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::{
     evaluate::EvaluateRequest,
-    judging::{Judged, answers, check_same},
+    judging::{Judged, answers, check_same, warn_of_learned},
     recognition::Model,
     samples::{Samples, SamplesError},
 };
@@ -94,6 +94,7 @@ fn measured(
     let name = |activity: &str| request.name_in_model(activity);
     let recogniser = model.recogniser(samples.full_frames);
     let judged = answers(recogniser, &samples.clips, false, &name, context)?;
+    warn_of_learned(recogniser, &samples, context)?;
     let (known, strange): (Vec<Judged>, Vec<Judged>) =
         judged.into_iter().partition(|judged| model.activities().contains(&judged.truth));
     if known.is_empty() {

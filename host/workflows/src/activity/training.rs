@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 use serde_with::{DisplayFromStr, serde_as};
 
 use super::{
+    doubts,
     method::MethodOptions,
     motion::{self, MotionFile},
     samples::{SCALING, Samples},
@@ -195,9 +196,9 @@ fn train(request: &TrainRequest, context: &Context<'_>) -> Result<TrainingFigure
         .enumerate()
         .flat_map(|(number, clips)| clips.into_iter().flat_map(windows).map(move |clip| (number, clip)))
         .unzip();
-    if let Some(warning) = too_few_performances(&clips, &numbers) {
-        context.progress.warn(&warning);
-    }
+    doubts::warn(clips.iter(), context);
+    let few = too_few_performances(&clips, &numbers);
+    few.iter().for_each(|warning| context.progress.warn(warning));
     let alone = of_one_subject(&clips);
     if !alone.is_empty() {
         context.progress.warn(&format!(
@@ -210,6 +211,9 @@ fn train(request: &TrainRequest, context: &Context<'_>) -> Result<TrainingFigure
     let watch = training_progress::Training::new(context);
     let trained = Recogniser::train_performances(&clips, &numbers, &experiment, SCALING, &watch);
     let (model, inner_accuracy) = training_progress::outcome(trained, context, "training").about(|| what)?;
+    if let Some(warning) = without_limits(&model).filter(|_| few.is_none()) {
+        context.progress.warn(&warning);
+    }
     staging::write_file(&request.out, &model.to_bytes()?)?;
     context.info(&format!("wrote {}", request.out.display()));
     let (gamma, condition_number) = match &model.space.map {
@@ -254,6 +258,18 @@ fn too_few_performances(clips: &[Clip], numbers: &[usize]) -> Option<String> {
         format!(
             "a single subject needs {fewest} performances for a limit of unknown, found {found} (views and windows of one \
              count once): nothing is called unknown; add performances, or clips of a second person"
+        )
+    })
+}
+
+/// Why a model calls nothing unknown.
+fn without_limits(model: &Recogniser) -> Option<String> {
+    let limits = model.second.as_ref().map_or(&model.limits, |second| &second.limits);
+    limits.distances.iter().all(|limit| limit.is_infinite()).then(|| {
+        format!(
+            "a limit of unknown needs {} clips of activities that another subject (or, of a single one, another performance) shows \
+             too: nothing is called unknown; add clips",
+            Limits::fewest(Limits::FALSE_ALARMS)
         )
     })
 }
@@ -324,6 +340,8 @@ fn pattern(model: &Recogniser) -> String {
 #[cfg(test)]
 mod tests {
     use farnear_files::masks;
+    use farnear_recognition::model::RecogniserSettings;
+    use farnear_recognition::space::SpaceSettings;
     use farnear_silhouettes::mask::Mask;
 
     use super::*;
@@ -354,5 +372,20 @@ mod tests {
         assert!(warning.contains("19 performances") && warning.contains("found 1 "), "{warning}");
         clips[1].subject = "ann".into();
         assert_eq!(too_few_performances(&clips, &[0, 1]), None);
+
+        // Two people, but two clips.
+        clips[1].activity = "dig".into();
+        let space = SpaceSettings {
+            dimensions: 1,
+            pattern: PatternKind::Codebook(2),
+            residuals: 0,
+            ..SpaceSettings::default()
+        };
+        let settings = RecogniserSettings { space, ..RecogniserSettings::default() };
+        let mut model = Recogniser::train(&clips, &settings).expect("trained");
+        let warning = without_limits(&model).expect("two clips");
+        assert!(warning.contains("19 clips"), "{warning}");
+        model.limits.distances.fill(1.0);
+        assert_eq!(without_limits(&model), None);
     }
 }
