@@ -51,9 +51,10 @@ impl FrameHeader {
         ((8..=16).contains(&bits) && header.width > 0 && header.height > 0).then_some(header)
     }
 
-    /// Length field: header and pixels, bytes.
+    /// Length field: header and pixels, bytes. [`IN_USE`], never a valid length, for a picture that exceeds the field.
     pub fn length(&self) -> u32 {
-        FRAME_HEADER as u32 + 2 * u32::from(self.width) * u32::from(self.height)
+        let pixels = u32::from(self.width) * u32::from(self.height);
+        pixels.saturating_mul(2).saturating_add(FRAME_HEADER as u32)
     }
 }
 

@@ -3,6 +3,8 @@
 import os
 import signal
 import socket
+import subprocess
+import sys
 import threading
 import time
 
@@ -33,6 +35,24 @@ def test_a_pair_gives_the_scenes_depth(emulated_rig, optics):
     found = farnear.depth(far.image, near.image, optics)
     # docs/accuracy.md: 0.7 mm for planes at 8 bit, over many pixels.
     assert np.nanmedian(found.depth_mm) == pytest.approx(910, abs=1)
+
+
+@pytest.mark.emulated_rig(noise="12bit", seed=2)
+class TestMarkers:
+    @pytest.mark.emulated_rig(scene="plane:910")
+    def test_a_tests_marker_adds_to_that_of_its_class(self, emulated_rig):
+        emulated_rig.home()
+        assert [exposure.bits for exposure in emulated_rig.expose([("fine", 50)])] == [12]
+
+
+def test_a_marker_without_names_is_refused(tmp_path):
+    file = tmp_path / "test_it.py"
+    file.write_text(
+        "import pytest\nfrom farnear.pytest_plugin import emulated_rig\n"
+        "@pytest.mark.emulated_rig('plane:910')\ndef test_it(emulated_rig): pass\n"
+    )
+    run = subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(file)], capture_output=True, text=True)
+    assert run.returncode == 1 and "scene='plane:910'" in run.stdout, run.stdout
 
 
 def test_a_sequence_of_micro_manager_goes_through_the_focus(emulated_rig):

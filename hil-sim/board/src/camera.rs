@@ -35,6 +35,8 @@ pub struct Camera {
     latency_ns: u64,
     armed: bool,
     busy_until_ns: u64,
+    /// Before the exposure that was scheduled last.
+    was_busy_until_ns: u64,
     free_run: Option<FreeRun>,
     triggers: u32,
     missed: u32,
@@ -50,6 +52,7 @@ impl Camera {
             latency_ns: 0,
             armed: false,
             busy_until_ns: 0,
+            was_busy_until_ns: 0,
             free_run: None,
             triggers: 0,
             missed: 0,
@@ -71,6 +74,7 @@ impl Camera {
         let end_ns = begin_ns + exposure_ns.max(1);
         self.coming.insert(begin_ns, Edge::Begin(id));
         self.coming.insert(end_ns, Edge::End);
+        self.was_busy_until_ns = self.busy_until_ns;
         self.busy_until_ns = end_ns + READOUT_NS + self.delay_ns;
     }
 
@@ -107,13 +111,12 @@ impl Camera {
     /// Starts free running; period 0 stops it.
     pub fn run_freely(&mut self, now_ns: u64, period_ns: u64, exposure_ns: u64) {
         // An exposure scheduled but not begun is cancelled, so that it does not block triggers.
-        if let (Some(run), Some((&begin_ns, Edge::Begin(FREE_RUNNING)))) =
+        if let (Some(_), Some((&begin_ns, Edge::Begin(FREE_RUNNING)))) =
             (self.free_run.take(), self.coming.first_key_value())
             && begin_ns > now_ns
         {
-            let last_end_ns = begin_ns + run.exposure_ns - run.period_ns.min(begin_ns);
             self.coming.clear();
-            self.busy_until_ns = last_end_ns + READOUT_NS + self.delay_ns;
+            self.busy_until_ns = self.was_busy_until_ns;
         }
         if period_ns > 0 {
             let shortest_ns = exposure_ns.max(1) + READOUT_NS;
@@ -135,7 +138,7 @@ impl Camera {
         if let (Edge::End, Some(run)) = (edge, self.free_run)
             && !self.armed
         {
-            let begin_ns = at_ns + run.period_ns - run.exposure_ns;
+            let begin_ns = (at_ns + run.period_ns - run.exposure_ns).max(self.busy_until_ns);
             self.schedule(begin_ns, run.exposure_ns, FREE_RUNNING);
         }
         Some((at_ns, edge))
@@ -188,6 +191,31 @@ mod tests {
         camera.trigger(16_001_000, false);
         camera.trigger(17_000_000, true);
         assert!(camera.next_ns().is_some());
+    }
+
+    #[test]
+    fn a_free_run_that_ends_before_its_first_exposure_does_not_shorten_the_readout() {
+        let mut camera = Camera::new(1);
+        camera.trigger(101_000_000, true);
+        camera.trigger(106_000_000, false);
+        while camera.due(107_000_000).is_some() {}
+        camera.run_freely(108_000_000, 40_000_000, 5_000_000);
+        camera.run_freely(109_000_000, 0, 0);
+        camera.trigger(110_000_000, true);
+        camera.trigger(111_000_000, false);
+        assert_eq!((camera.next_ns(), camera.missed()), (None, 1));
+        camera.trigger(117_000_000, true);
+        assert_eq!(camera.missed(), 1, "the readout has ended");
+    }
+
+    #[test]
+    fn a_slow_readout_delays_a_free_run() {
+        let mut camera = Camera::new(1);
+        camera.set_delay_ns(50_000_000);
+        camera.run_freely(0, 40_000_000, 5_000_000);
+        assert_eq!(camera.due(1_000_000), Some((1_000_000, Edge::Begin(FREE_RUNNING))));
+        assert_eq!(camera.due(6_000_000), Some((6_000_000, Edge::End)));
+        assert_eq!(camera.next_ns(), Some(66_000_000));
     }
 
     #[test]

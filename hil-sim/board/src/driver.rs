@@ -3,7 +3,6 @@
 mod scenario;
 
 use std::{
-    path::PathBuf,
     sync::mpsc::{Receiver, RecvTimeoutError},
     time::Duration,
 };
@@ -25,7 +24,7 @@ use crate::{
     faults::{Lines, Moment, Schedule},
     link_rates::LinkRates,
     memory::MemoryChip,
-    memory_file,
+    memory_file::Kept,
     observer::{Observer, Seen, Truth},
     pacing::Pacing,
     parts::Parts,
@@ -72,7 +71,7 @@ pub struct Driver {
     script: Option<Script>,
     looks_at_ns: Option<u64>,
     /// File and final contents of the memory.
-    memory: Option<(PathBuf, Vec<u8>)>,
+    memory: Option<(Kept, Vec<u8>)>,
     adapter: Adapter,
     /// Bytes for the board that arrived during a requested advance.
     held: Vec<u8>,
@@ -110,7 +109,7 @@ impl Driver {
             trace,
             script: None,
             looks_at_ns: None,
-            memory: config.memory.clone().map(|path| (path, Vec::new())),
+            memory: None,
             adapter: Adapter::default(),
             held: Vec::new(),
             resets: 0,
@@ -130,8 +129,8 @@ impl Driver {
     /// Writes the remaining outputs; returns the first error of the run.
     pub fn finish(self) -> Result<(), SimError> {
         self.trace.map_or(Ok(()), Trace::finish)?;
-        if let Some((path, contents)) = self.memory.filter(|(_, contents)| !contents.is_empty()) {
-            memory_file::write(&path, &contents)?;
+        if let Some((kept, contents)) = self.memory.filter(|(_, contents)| !contents.is_empty()) {
+            kept.write(&contents)?;
         }
         self.failed.map_or(Ok(()), Err)
     }

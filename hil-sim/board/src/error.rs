@@ -7,6 +7,8 @@ use thiserror::Error;
 pub enum SimError {
     #[error("{} has {length} bytes, the board's memory {expected}: name a file that an earlier run wrote, or a new one", path.display())]
     Memory { path: PathBuf, length: usize, expected: usize },
+    #[error("{} was changed during this run, whose memory is not written: give each rig its own file", path.display())]
+    MemoryChanged { path: PathBuf },
     #[error("no firmware at {}: run `cargo xtask firmware` to build it, or name an ELF with --firmware", .0.display())]
     NoFirmware(PathBuf),
     #[error("the firmware {} cannot be loaded: {reason}", path.display())]

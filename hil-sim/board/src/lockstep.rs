@@ -26,7 +26,8 @@ const ENDED: usize = 256;
 pub struct Lockstep {
     to_board: Decoder,
     from_board: Decoder,
-    asked: BTreeMap<u32, Asked>,
+    /// Unanswered requests in the order of sending. An id may occur twice: the board answers each frame.
+    asked: Vec<Asked>,
     running: BTreeMap<u32, u64>,
     /// Ended requests; a repeated answer to one starts nothing.
     ended: VecDeque<u32>,
@@ -40,6 +41,7 @@ pub struct Lockstep {
 
 #[derive(Debug)]
 struct Asked {
+    id: u32,
     work: Work,
     until_ns: u64,
     body: Vec<u8>,
@@ -111,8 +113,11 @@ impl Lockstep {
             if packet.header.kind == Kind::Request {
                 // Anything but a request of this version is only refused.
                 let work = packet.message().map_or(Work::Done, |call: Call| Work::of(&call.request));
-                let asked = Asked { work, until_ns: now_ns + ANSWER_NS, body: packet.body.to_vec() };
-                self.asked.insert(packet.header.id, asked);
+                let (id, body) = (packet.header.id, packet.body.to_vec());
+                let until_ns = now_ns + ANSWER_NS;
+                // A later repeat takes the place of its request, which may have been lost.
+                self.asked.retain(|old| old.id != id || old.body != body || old.until_ns == until_ns);
+                self.asked.push(Asked { id, work, until_ns, body });
             }
         }
     }
@@ -122,8 +127,15 @@ impl Lockstep {
         let mut decoder = Decoder::new();
         let packets: Vec<Packet> = frame.iter().filter_map(|byte| decoder.push(*byte)?.ok()).collect();
         let [packet] = packets.as_slice() else { return false };
-        let asked = self.asked.get(&packet.header.id);
-        packet.header.kind == Kind::Request && asked.is_some_and(|asked| asked.body == packet.body.as_slice())
+        let id = packet.header.id;
+        packet.header.kind == Kind::Request
+            && self.asked.iter().any(|asked| asked.id == id && asked.body == packet.body.as_slice())
+    }
+
+    /// Removes the oldest request with this id; returns its work.
+    fn answered(&mut self, id: u32) -> Option<Work> {
+        let at = self.asked.iter().position(|asked| asked.id == id)?;
+        Some(self.asked.remove(at).work)
     }
 
     /// The host has answered or timed out: time may pass.
@@ -151,7 +163,7 @@ impl Lockstep {
         let id = packet.header.id;
         match packet.header.kind {
             Kind::Response => {
-                let work = self.asked.remove(&id).map(|asked| asked.work);
+                let work = self.answered(id);
                 match packet.message::<Response>() {
                     Some(Response::Accepted) if work == Some(Work::Long) && !self.ended.contains(&id) => {
                         self.running.insert(id, now_ns + WORK_NS);
@@ -165,7 +177,7 @@ impl Lockstep {
                 }
             }
             Kind::Error => {
-                self.asked.remove(&id);
+                self.answered(id);
             }
             Kind::Event => {
                 if let Some(event) = packet.message::<Event>() {
@@ -231,7 +243,7 @@ impl Lockstep {
     }
 
     pub fn is_busy(&mut self, now_ns: u64) -> bool {
-        self.asked.retain(|_, asked| asked.until_ns > now_ns);
+        self.asked.retain(|asked| asked.until_ns > now_ns);
         self.running.retain(|_, until| *until > now_ns);
         self.starting = self.starting.filter(|until| *until > now_ns);
         let runs = self.running.keys().any(|request| Some(*request) != self.paused);
@@ -247,7 +259,7 @@ impl Lockstep {
 #[cfg(test)]
 mod tests {
     use farnear_protocol::{
-        BoardMicros, Micros, Nanometres, PROTOCOL_CURRENT,
+        BoardMicros, Micros, Nanometres, PROTOCOL_CURRENT, RequestError,
         frame::{Header, encode},
         message::{Axis, ResetCause},
     };
@@ -294,6 +306,22 @@ mod tests {
         lockstep.sent(&request, 20);
         lockstep.received(&accepted, 21);
         assert!(!lockstep.is_busy(22));
+    }
+
+    #[test]
+    fn a_used_id_and_a_repeat_in_the_same_write_are_answered_each() {
+        let mut lockstep = started();
+        let body =
+            Request::Move { axis: Axis::SensorFine, target: Nanometres(5), silence: Micros(1_000_000) };
+        let (request_7, other) = (request(7, body), request(7, Request::Status));
+        lockstep.sent(&[request_7.clone(), request_7, other].concat(), 10);
+        let accepted = frame(Kind::Response, 7, &Response::Accepted);
+        lockstep.received(&accepted, 11);
+        assert!(lockstep.is_asked(), "the repeat and the other request are not answered");
+        lockstep.received(&accepted, 12);
+        lockstep.received(&frame(Kind::Error, 7, &RequestError::IdReused), 13);
+        assert!(!lockstep.is_asked());
+        assert!(lockstep.is_busy(ANSWER_NS * 2), "the move runs");
     }
 
     #[test]

@@ -30,13 +30,39 @@ fn aside(path: &Path) -> PathBuf {
     path.with_added_extension(format!("partial-{}", std::process::id()))
 }
 
-/// Fails if [`write()`], which comes at the end of a run, could not create the file.
-pub fn check_writable(path: &Path) -> Result<(), SimError> {
+/// Fails if the file could not be written at the end of the run.
+fn check_writable(path: &Path) -> Result<(), SimError> {
     let aside = aside(path);
     fs::write(&aside, []).and_then(|()| fs::remove_file(&aside)).map_err(failed("write", path))
 }
 
-pub fn write(path: &Path, contents: &[u8]) -> Result<(), SimError> {
+/// The file of a run with its contents at the start.
+#[derive(Debug)]
+pub struct Kept {
+    path: PathBuf,
+    before: Option<Box<[u8; SIZE]>>,
+}
+
+impl Kept {
+    pub fn read(path: &Path) -> Result<Self, SimError> {
+        check_writable(path)?;
+        Ok(Self { path: path.into(), before: read(path)? })
+    }
+
+    pub fn before(&self) -> Option<&[u8; SIZE]> {
+        self.before.as_deref()
+    }
+
+    /// Fails if the file has changed: another rig's records would be lost.
+    pub fn write(&self, contents: &[u8]) -> Result<(), SimError> {
+        if read(&self.path)?.as_deref() != self.before() {
+            return Err(SimError::MemoryChanged { path: self.path.clone() });
+        }
+        write(&self.path, contents)
+    }
+}
+
+fn write(path: &Path, contents: &[u8]) -> Result<(), SimError> {
     let aside = aside(path);
     let written = fs::write(&aside, contents).and_then(|()| fs::rename(&aside, path));
     written.map_err(|error| {
@@ -61,6 +87,11 @@ mod tests {
         contents[77] = 0xa5;
         write(&path, &contents).expect("writable");
         assert_eq!(read(&path).expect("readable").as_deref(), Some(&contents));
+        let kept = Kept::read(&path).expect("readable");
+        kept.write(&[1; SIZE]).expect("unchanged");
+        let refused = kept.write(&[2; SIZE]).expect_err("another rig has written it").to_string();
+        assert!(refused.contains("memory.bin") && refused.contains("its own file"), "{refused}");
+        assert_eq!(read(&path).expect("readable").as_deref(), Some(&[1; SIZE]));
         fs::write(&path, [1, 2, 3]).expect("writable");
         let refused = read(&path).expect_err("three bytes are refused").to_string();
         assert!(refused.contains("3 bytes") && refused.contains("32768"), "{refused}");

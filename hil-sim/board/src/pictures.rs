@@ -42,9 +42,11 @@ impl Pictures {
         }
     }
 
-    /// Drops the pictures of an ended free run, which would delay the next client.
+    /// Drops the pictures of an ended free run, which would delay the next client. A client that fetches its pictures
+    /// has at most the last [`WAITING_MAX`] to come, and a program's shots may be among them.
     fn end_free_run(&self) {
-        self.free_run_from.store(self.exposed.load(Ordering::Relaxed), Ordering::Relaxed);
+        let from = self.exposed.load(Ordering::Relaxed).saturating_sub(WAITING_MAX);
+        self.free_run_from.store(from, Ordering::Relaxed);
     }
 
     /// Whether this exposure, counted from 0, belongs to a free run that has ended.
@@ -131,13 +133,15 @@ mod tests {
     }
 
     #[test]
-    fn pictures_of_an_ended_free_run_are_not_rendered() {
+    fn only_the_last_pictures_of_an_ended_free_run_are_rendered() {
         let pictures = Arc::new(Pictures::default());
         let patience = Patience::new(Some(Arc::clone(&pictures)));
-        patience.expose();
+        (0..=WAITING_MAX).for_each(|_| patience.expose());
         assert!(!pictures.is_of_ended_run(0));
         patience.end_free_run();
         patience.expose();
-        assert_eq!([0, 1].map(|number| pictures.is_of_ended_run(number)), [true, false]);
+        let dropped: Vec<_> =
+            (0..WAITING_MAX + 2).filter(|number| pictures.is_of_ended_run(*number)).collect();
+        assert_eq!(dropped, [0]);
     }
 }

@@ -129,6 +129,9 @@ fn comment(text: &str) -> Result<Option<Entry>, String> {
 }
 
 fn parse(text: &str) -> Result<(RigConfig, Script), String> {
+    // A killed rig leaves a part of a line: the run is replayed up to the last complete time.
+    let complete = if text.ends_with('\n') { None } else { text.rfind("\n#") };
+    let text = complete.map_or(text, |end| &text[..=end]);
     let (heading, body) = text
         .split_once(END_OF_HEADING)
         .ok_or_else(|| format!("it has no {END_OF_HEADING}: a VCD that farnear-sim wrote is expected"))?;
@@ -210,5 +213,9 @@ mod tests {
             script.entries,
             [(7, Entry::Sent(vec![0, 255])), (9, order), (8, Entry::Looked { asked_ns: 8 })]
         );
+        for cut in ["$end\n", "\n"] {
+            let (_, script) = parse(text.trim_end_matches(cut)).expect("a trace of a killed rig");
+            assert_eq!((script.end_ns, script.entries.len()), (7, 1), "{cut:?} is missing");
+        }
     }
 }

@@ -155,13 +155,12 @@ pub fn launch(config: &RigConfig, outlets: Outlets, script: Option<Script>) -> R
     let fingerprint = firmware::fingerprint(image.bytes());
     let mut board = RigBoard::new(&plant, line.clone(), (config.seed, fingerprint), &config.parts, costs)
         .map_err(|error| emulator(&error))?;
-    config.memory.as_deref().map_or(Ok(()), memory_file::check_writable)?;
-    if let Some(file) = &config.memory
-        && let Some(contents) = memory_file::read(file)?
+    let kept = config.memory.as_deref().map(memory_file::Kept::read).transpose()?;
+    if let Some(contents) = kept.as_ref().and_then(memory_file::Kept::before)
         && !script_given
         && let Some(memory) = board.chip.memory()
     {
-        memory.set_contents(&contents);
+        memory.set_contents(contents);
     }
     if let Some(contents) = script.as_ref().and_then(|script| script.memory.as_deref())
         && let Some(memory) = board.chip.memory()
@@ -176,6 +175,7 @@ pub fn launch(config: &RigConfig, outlets: Outlets, script: Option<Script>) -> R
     };
     let (commands, receiver) = mpsc::channel();
     let mut driver = Driver::new(config, receiver, outlets, plant, line, wiring, trace);
+    driver.keep(kept);
     if let Some(script) = script {
         if script.firmware != fingerprint {
             let reason = "the run was made with another firmware".into();

@@ -146,6 +146,13 @@ pub fn play_alone(scenario: &Scenario, firmware: Option<&Path>) -> Result<Outcom
 
 /// `progress` is called when a scenario ends. Violations are not errors.
 pub fn run(campaign: &Campaign, mut progress: impl FnMut(u64, &Outcome)) -> Result<Summary, SimError> {
+    // Before hours of scenarios.
+    let probe = campaign.out.join(format!(".probe-{}", std::process::id()));
+    let writable = fs::create_dir_all(&campaign.out).and_then(|()| fs::write(&probe, []));
+    writable.and_then(|()| fs::remove_file(&probe)).map_err(|source| {
+        let what = format!("cannot write to the folder {}", campaign.out.display());
+        SimError::Io { what, source }
+    })?;
     let seeds = campaign.own_seeds();
     let next = AtomicU64::new(0);
     let stopped = Mutex::new(None);
@@ -194,7 +201,6 @@ fn one(
     let small = shrink(&scenario, broken.property, play)?;
     let path = campaign.out.join(format!("{}-{seed}.toml", broken.property));
     let io = |source| SimError::Io { what: format!("cannot write {}", path.display()), source };
-    fs::create_dir_all(&campaign.out).map_err(io)?;
     let what = broken.what.replace('\n', " "); // a comment ends with its line
     let text = format!("# Breaks \"{}\": {what}\n\n{}", broken.property, small.text());
     fs::write(&path, text).map_err(io)?;
@@ -238,6 +244,16 @@ mod tests {
         // All but those that only revert another one, gauge drift, and a renamed port.
         assert!(!kinds.contains("gauge-drifts") && !kinds.contains("link-renamed"));
         assert_eq!(kinds.len(), farnear_sim::faults::KINDS.len() - 7, "{kinds:?}");
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_written_ends_a_campaign_before_its_first_scenario() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("file");
+        fs::write(&file, []).expect("writable");
+        let error = run(&campaign(&file.join("broken")), |seed, _| panic!("seed {seed} was played"));
+        let error = error.expect_err("a file cannot hold a folder").to_string();
+        assert!(error.contains("cannot write to the folder"), "{error}");
     }
 
     fn campaign(out: &Path) -> Campaign {

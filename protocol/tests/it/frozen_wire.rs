@@ -79,6 +79,8 @@ fn camera_endpoint() {
     let header =
         FrameHeader { shot_id: 2, exposure: BoardMicros(2_000_020), width: 640, height: 480, bits: 8 };
     assert_eq!(header.length(), 17 + 2 * 640 * 480);
+    let largest = FrameHeader { width: u16::MAX, height: u16::MAX, ..header };
+    assert_eq!(largest.length(), u32::MAX, "it exceeds the field");
     assert_eq!(header.to_bytes(), [2, 0, 0, 0, 0x94, 0x84, 0x1e, 0, 0, 0, 0, 0, 0x80, 2, 0xe0, 1, 8]);
     assert_eq!(FrameHeader::from_bytes(&header.to_bytes()), Some(header));
     let mut buffer = [0; 16];

@@ -9,6 +9,7 @@ use super::{Driver, Last};
 use crate::{
     board::RigBoard,
     faults::Moment,
+    memory_file::Kept,
     observer::Seen,
     plant::StageName,
     replay::{Entry, Script},
@@ -20,6 +21,10 @@ const MOTION_GAP_NS: u64 = 20_000_000;
 const WRITE_GAP_NS: u64 = 5_000_000;
 
 impl Driver {
+    pub fn keep(&mut self, memory: Option<Kept>) {
+        self.memory = memory.map(|kept| (kept, Vec::new()));
+    }
+
     pub fn follow(&mut self, mut script: Script) {
         let comparer = std::mem::take(&mut script.comparer);
         self.trace = Some(Trace::Vcd(Box::new(Vcd::compare(comparer))));

@@ -73,10 +73,16 @@ pub(super) fn open(
     let line = Arc::new(Line::default());
     let shared = line.clone();
     spawn("port out", move || {
+        // A pty keeps bytes for its first client, too: the board's start and a scenario's garbage.
+        let mut early = Some(Vec::new());
         for bytes in to_client {
             let client = shared.client().as_ref().and_then(|client| client.try_clone().ok());
-            // Without a client the bytes are lost.
-            let _ = client.map(|mut client| client.write_all(&bytes));
+            if let Some(mut client) = client {
+                let first = early.take().unwrap_or_default();
+                let _ = client.write_all(&[first, bytes].concat()); // it may have gone
+            } else if let Some(early) = &mut early {
+                early.extend(bytes);
+            } // otherwise lost
         }
         shared.unplugged.store(true, Ordering::Relaxed);
     })?;
@@ -118,4 +124,44 @@ fn configure(stream: &TcpStream) -> io::Result<()> {
     stream.set_nodelay(true)?;
     stream.set_read_timeout(Some(LOOK))?;
     stream.set_write_timeout(Some(PATIENCE))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{net::Ipv4Addr, sync::mpsc::channel};
+
+    use super::*;
+
+    #[test]
+    fn bytes_from_before_the_first_client_reach_it() {
+        let (board, to_client) = channel();
+        let (heard, hear) = channel();
+        let address = (Ipv4Addr::LOCALHOST, 0).into();
+        let name = open(address, to_client, move |_| heard.send(()).is_ok()).expect("loopback");
+        board.send(vec![1, 2]).expect("open");
+        thread::sleep(LOOK);
+        let mut client = TcpStream::connect(name.trim_start_matches("tcp:")).expect("it listens");
+        client.set_read_timeout(Some(Duration::from_secs(20))).expect("a socket");
+        client.write_all(&[5, 0]).expect("open");
+        hear.recv_timeout(Duration::from_secs(20)).expect("the client is known");
+        board.send(vec![3]).expect("open");
+        let mut bytes = [0; 3];
+        client.read_exact(&mut bytes).expect("all bytes");
+        assert_eq!(bytes, [1, 2, 3]);
+    }
+
+    #[test]
+    fn whole_frames_of_a_client_that_dies_within_another_arrive() {
+        let (_board, to_client) = channel();
+        let (heard, hear) = channel();
+        let from_client = move |command| {
+            let Command::Bytes(bytes) = command else { return true };
+            heard.send(bytes).is_ok()
+        };
+        let name = open((Ipv4Addr::LOCALHOST, 0).into(), to_client, from_client).expect("loopback");
+        let mut client = TcpStream::connect(name.trim_start_matches("tcp:")).expect("it listens");
+        client.write_all(&[5, 0, 6]).expect("open");
+        drop(client);
+        assert_eq!(hear.recv_timeout(Duration::from_secs(20)), Ok(vec![5, 0]));
+    }
 }
