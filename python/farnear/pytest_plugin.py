@@ -11,7 +11,7 @@ import pytest
 def emulated_rig(request: pytest.FixtureRequest) -> Iterator[Any]:
     """A connected `farnear.rig.Rig`, emulated, new for each test. Skips where `farnear-sim` is not installed.
 
-    `@pytest.mark.emulated_rig(scene="plane:910", seed=2)` says what it is made of, as `farnear.rig.EmulatedRig` takes it. A
+    `@pytest.mark.emulated_rig(scene="plane:910", seed=2)` sets its parts, as `farnear.rig.EmulatedRig` takes it. A
     marker of a test adds to those of its class and module.
     """
     from farnear.rig import EmulatedRig, find_simulator

@@ -93,7 +93,7 @@ impl Folder {
         let path = self.path.join(ROWS);
         let rows = match &mut self.rows {
             Some(rows) => {
-                // The open file outlives its folder, which the next pair would make anew.
+                // The open file outlives its folder, which the next pair would create again.
                 fs::metadata(&path)?;
                 rows
             }
