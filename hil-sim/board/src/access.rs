@@ -59,11 +59,13 @@ impl RigAccess<'_, '_> {
     /// `pressed` opens the circuit. Its third contact cuts the supply of the drivers, which forget the microstep.
     pub fn set_emergency_stop(&mut self, pressed: bool) {
         self.wiring.press_stop(pressed);
-        self.plant(|plant| {
-            for name in [StageName::Sensor, StageName::Lens] {
-                plant.stage_mut(name).reset_sequencer();
-            }
-        });
+        if pressed {
+            self.plant(|plant| {
+                for name in [StageName::Sensor, StageName::Lens] {
+                    plant.stage_mut(name).reset_sequencer();
+                }
+            });
+        }
     }
 
     pub fn set_driver_fault(&mut self, stage: StageName, fault: bool) {

@@ -43,7 +43,7 @@ impl Pictures {
     }
 
     /// Drops the pictures of an ended free run, which would delay the next client. A client that fetches its pictures
-    /// has at most the last [`WAITING_MAX`] to come, and a program's shots may be among them.
+    /// usually has at most the last [`WAITING_MAX`] to come, and a program's shots may be among them.
     fn end_free_run(&self) {
         let from = self.exposed.load(Ordering::Relaxed).saturating_sub(WAITING_MAX);
         self.free_run_from.store(from, Ordering::Relaxed);

@@ -95,7 +95,9 @@ fn read(end: &mut impl End, unplugged: &AtomicBool, from_client: &impl Fn(Comman
                 if !matches!(error.kind(), TimedOut | WouldBlock | Interrupted) {
                     if !end.survives(&error) {
                         // The whole frames in front of one that the client never finished.
-                        from_client(Command::Bytes(frames));
+                        if !frames.is_empty() {
+                            from_client(Command::Bytes(frames));
+                        }
                         return;
                     }
                     thread::sleep(LOOK);

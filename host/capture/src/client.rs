@@ -6,7 +6,7 @@
 
 use std::{
     sync::{
-        Arc, Mutex, MutexGuard, PoisonError, Weak,
+        Arc, Mutex, MutexGuard, PoisonError,
         atomic::{AtomicBool, Ordering},
         mpsc::{RecvTimeoutError, Sender, channel, sync_channel},
     },
@@ -22,7 +22,7 @@ use farnear_protocol::{
 use crate::{
     error::ClientError,
     log_stream::LogStream,
-    owner::{Answered, Command, Connect, Listener, Owner, Question, Session, nonsense, nothing},
+    owner::{Answered, Command, Connect, Held, Listener, Owner, Question, Session, nonsense, nothing},
     timing::{Pace, Timing},
     transport::{Place, with_rate},
 };
@@ -56,8 +56,7 @@ struct Port {
     timing: Arc<Mutex<Timing>>,
     wanted: Option<LinkRate>,
     known: Mutex<Known>,
-    /// Ids of work, and whether a handle still has it.
-    works: Mutex<Vec<(u32, Weak<()>)>>,
+    held: Held,
     inbox: Option<Sender<Command>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -138,14 +137,14 @@ impl Client {
             Arc::clone(&timing)
         };
         let owner = Owner::start(connect, port, emulated, rates, choose, commands, interrupt.clone())?;
-        let session = owner.session();
+        let (session, held) = (owner.session(), owner.held());
         let thread = std::thread::spawn(move || owner.run());
         let port = Port {
             name: port.into(),
             timing,
             wanted: rates.1,
             known: Mutex::default(),
-            works: Mutex::default(),
+            held,
             inbox: Some(inbox),
             thread: Some(thread),
         };
@@ -192,9 +191,10 @@ impl Client {
         self.port.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Ids of the work of all handles; dropped work may be among them.
-    pub(crate) fn works(&self) -> MutexGuard<'_, Vec<(u32, Weak<()>)>> {
-        self.port.works.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Whether a handle has work that it has not dropped.
+    pub(crate) fn has_work(&self) -> bool {
+        let held = self.port.held.lock().unwrap_or_else(PoisonError::into_inner);
+        held.iter().any(|held| held.strong_count() > 0)
     }
 
     pub fn hello(&self) -> &Hello {

@@ -158,7 +158,7 @@ impl Link {
         during: &str,
     ) -> Result<Asked, ClientError> {
         let (id, session) = if *request == Request::Hello {
-            (HELLO_ID, NO_SESSION) // equal bytes at each rate: a slow board recognises the repeat
+            (HELLO_ID, NO_SESSION) // one id at all rates, so that a late answer counts
         } else {
             let id = self.next_id;
             self.next_id = id.wrapping_add(1).max(1);

@@ -87,6 +87,9 @@ pub(crate) enum Command {
     Logs(SyncSender<LogPart>),
 }
 
+/// The work that handles may have, entered before its start is answered.
+pub(crate) type Held = Arc<Mutex<Vec<Weak<()>>>>;
+
 pub(crate) struct Owner {
     link: Link,
     connect: Connect,
@@ -100,6 +103,7 @@ pub(crate) struct Owner {
     next_attempt: Instant,
     events: Events,
     works: BTreeMap<u32, Listener>,
+    held: Held,
     logs: Readers,
     next_log: Option<u32>,
     still_there: bool,
@@ -149,6 +153,7 @@ impl Owner {
             next_attempt: now,
             events,
             works: BTreeMap::new(),
+            held: Held::default(),
             logs: Readers::default(),
             next_log: None,
             still_there: false,
@@ -162,6 +167,10 @@ impl Owner {
 
     pub(crate) fn session(&self) -> Session {
         self.session.clone()
+    }
+
+    pub(crate) fn held(&self) -> Held {
+        Arc::clone(&self.held)
     }
 
     pub(crate) fn run(mut self) {
@@ -222,6 +231,9 @@ impl Owner {
         for (question, answered) in questions.into_iter().zip(&answered) {
             if let (Some(listener), Ok((id, Response::Accepted))) = (question.listener, answered) {
                 abandoned |= listener.held.strong_count() == 0;
+                let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
+                held.retain(|held| held.strong_count() > 0);
+                held.push(listener.held.clone());
                 // Registered before events are delivered, so that even ended work gets its end.
                 self.works.insert(*id, listener);
             }

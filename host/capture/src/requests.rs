@@ -50,10 +50,9 @@ impl Client {
             Err(error) => error,
             done => return done,
         };
-        let ClientError::Refused { error: RequestError::Busy { request }, .. } = error else {
-            return Err(error);
-        };
-        if self.works().iter().any(|(id, held)| *id == request && held.strong_count() > 0) {
+        let is_busy = matches!(error, ClientError::Refused { error: RequestError::Busy { .. }, .. });
+        // A stop would end the work of all handles.
+        if !is_busy || self.has_work() {
             return Err(error);
         }
         self.stop()?;

@@ -266,9 +266,6 @@ impl Client {
             match answered {
                 Ok((id, Response::Accepted)) => {
                     let allowed = self.timing().allowance(plan.work);
-                    let mut works = self.works();
-                    works.retain(|(_, held)| held.strong_count() > 0);
-                    works.push((id, Arc::downgrade(&held)));
                     started.push(Work {
                         client: self.clone(),
                         id,

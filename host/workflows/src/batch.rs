@@ -373,15 +373,21 @@ impl Work<'_> {
         let kind = jobs::kind(kind)?;
         jobs::check_outputs(kind, fields)?;
         let out = fields.base().join(fields.text("out")?);
-        let work = (kind.job)(fields.all(), fields.base())?;
-        for path in work.inputs() {
-            match self.outs.maker_of(&path, line)? {
-                Some(maker) if maker > line => return Err(BatchError::Order { path, line: maker }.into()),
-                Some(_) if self.settings.dry_run && !path.exists() => return Ok((State::Todo, None)),
-                Some(maker) => self.running.wait_for(maker),
-                None => {}
+        let mut is_made_first = false;
+        for path in kind.files(&fields.all(), fields.base()) {
+            let Some(maker) = self.outs.maker_of(&path, line)? else { continue };
+            if maker > line {
+                return Err(BatchError::Order { path, line: maker }.into());
             }
+            self.running.wait_for(maker);
+            is_made_first |= self.settings.dry_run && !path.exists();
         }
+        context.cancel.check("waiting for another job")?;
+        if is_made_first {
+            return Ok((State::Todo, None));
+        }
+        // Now, because a text is the name of a file only if that exists.
+        let work = (kind.job)(fields.all(), fields.base())?;
         let input = self.sums.of(&work.inputs(), &self.base, &|path: &Path| self.outs.makes(path))?;
         let wanted = Provenance::new(kind.name, fields, input);
         let place = Place::new(out, makes_file(kind));

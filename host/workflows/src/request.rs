@@ -357,7 +357,9 @@ fn coerce(value: Value, property: &Value, schema: &Value) -> Value {
         Value::Number(number) if accepts("string") && !accepts("number") && !accepts("integer") => {
             Value::String(number.to_string())
         }
-        single @ (Value::Number(_) | Value::Bool(_)) if accepts("array") => Value::Array(vec![single]),
+        single @ (Value::Number(_) | Value::Bool(_)) if accepts("array") => {
+            coerce(Value::Array(vec![single]), property, schema)
+        }
         Value::Array(parts) => Value::Array(match property.get("items") {
             Some(item) => parts.into_iter().map(|part| coerce(part, item, schema)).collect(),
             None => parts,

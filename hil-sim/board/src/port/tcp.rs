@@ -37,21 +37,31 @@ impl End for Connection {
     }
 }
 
+/// Bytes that are kept for the first client, about as many as a pty keeps: the board's start and a scenario's garbage.
+const EARLY_MAX: usize = 4096;
+
+#[derive(Default)]
+struct Client {
+    stream: Option<TcpStream>,
+    was_there: bool,
+    early: Vec<u8>,
+}
+
 #[derive(Default)]
 struct Line {
-    client: Mutex<Option<TcpStream>>,
+    client: Mutex<Client>,
     unplugged: AtomicBool,
 }
 
 impl Line {
-    fn client(&self) -> MutexGuard<'_, Option<TcpStream>> {
+    fn client(&self) -> MutexGuard<'_, Client> {
         self.client.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Whether the last client leaves within the grace period.
     fn becomes_free(&self) -> bool {
         let until = Instant::now() + FAREWELL;
-        while self.client().is_some() {
+        while self.client().stream.is_some() {
             if Instant::now() > until {
                 return false;
             }
@@ -73,16 +83,16 @@ pub(super) fn open(
     let line = Arc::new(Line::default());
     let shared = line.clone();
     spawn("port out", move || {
-        // A pty keeps bytes for its first client, too: the board's start and a scenario's garbage.
-        let mut early = Some(Vec::new());
         for bytes in to_client {
-            let client = shared.client().as_ref().and_then(|client| client.try_clone().ok());
-            if let Some(mut client) = client {
-                let first = early.take().unwrap_or_default();
-                let _ = client.write_all(&[first, bytes].concat()); // it may have gone
-            } else if let Some(early) = &mut early {
-                early.extend(bytes);
-            } // otherwise lost
+            let mut client = shared.client();
+            if !client.was_there {
+                let room = EARLY_MAX.saturating_sub(client.early.len());
+                client.early.extend(bytes.iter().take(room));
+            }
+            let stream = client.stream.as_ref().and_then(|stream| stream.try_clone().ok());
+            drop(client);
+            // Without a client the bytes are lost.
+            let _ = stream.map(|mut stream| stream.write_all(&bytes));
         }
         shared.unplugged.store(true, Ordering::Relaxed);
     })?;
@@ -105,16 +115,20 @@ fn accept(
             continue;
         }
         let (Ok(()), Ok(reader)) = (configure(&stream), stream.try_clone()) else { continue };
-        *line.client() = Some(stream);
+        let mut client = line.client();
+        client.was_there = true;
+        let _ = (&stream).write_all(&std::mem::take(&mut client.early)); // the client may have gone
+        client.stream = Some(stream);
+        drop(client);
         let (shared, from_client) = (line.clone(), from_client.clone());
         let work = move || {
             read(&mut Connection(reader), &shared.unplugged, &*from_client);
-            if let Some(gone) = shared.client().take() {
+            if let Some(gone) = shared.client().stream.take() {
                 let _ = gone.shutdown(Shutdown::Both); // the client may have done so
             }
         };
         if spawn("port client", work).is_err() {
-            line.client().take();
+            line.client().stream.take();
         }
     }
 }
@@ -135,18 +149,15 @@ mod tests {
     #[test]
     fn bytes_from_before_the_first_client_reach_it() {
         let (board, to_client) = channel();
-        let (heard, hear) = channel();
-        let address = (Ipv4Addr::LOCALHOST, 0).into();
-        let name = open(address, to_client, move |_| heard.send(()).is_ok()).expect("loopback");
+        let name = open((Ipv4Addr::LOCALHOST, 0).into(), to_client, |_| true).expect("loopback");
         board.send(vec![1, 2]).expect("open");
         thread::sleep(LOOK);
         let mut client = TcpStream::connect(name.trim_start_matches("tcp:")).expect("it listens");
         client.set_read_timeout(Some(Duration::from_secs(20))).expect("a socket");
-        client.write_all(&[5, 0]).expect("open");
-        hear.recv_timeout(Duration::from_secs(20)).expect("the client is known");
-        board.send(vec![3]).expect("open");
         let mut bytes = [0; 3];
-        client.read_exact(&mut bytes).expect("all bytes");
+        client.read_exact(&mut bytes[..2]).expect("without another byte of the board");
+        board.send(vec![3]).expect("open");
+        client.read_exact(&mut bytes[2..]).expect("the next byte");
         assert_eq!(bytes, [1, 2, 3]);
     }
 

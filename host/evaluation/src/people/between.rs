@@ -5,7 +5,7 @@ use farnear_recognition::alignment::Alignment;
 use farnear_recognition::choice::Views;
 use farnear_recognition::classifier::Family;
 use farnear_recognition::clip::Clip;
-use farnear_recognition::evaluation::{confusion::wilson, leave_one_out::train_on_others};
+use farnear_recognition::evaluation::leave_one_out::train_on_others;
 use farnear_recognition::experiment::Experiment;
 use farnear_recognition::frames::Mode;
 use farnear_recognition::model::Recogniser;
@@ -175,8 +175,6 @@ fn accuracy(pair: &Pair, mode: Mode, cut_out: bool, network: &[u8], way: &Way) -
     let experiment = Experiment { align: way.align, self_training: way.self_training, ..experiment.fixed() };
     let (train, test) = (kept(&pair.train, "train"), kept(&pair.test, "test"));
     let outcome = train_on_others(&train, &test, &experiment, &[Views::Each], &Unwatched)?;
-    let share = outcome.each.accuracy();
-    let trials = pair.clips as u32;
-    let (low, high) = wilson((share * f64::from(trials)).round() as u32, trials, 1.96);
-    Ok(format!("{:.1} ({:.0} to {:.0})", 100.0 * share, 100.0 * low, 100.0 * high))
+    let (low, high) = outcome.each.interval(pair.clips as u32);
+    Ok(format!("{:.1} ({:.0} to {:.0})", 100.0 * outcome.each.accuracy(), 100.0 * low, 100.0 * high))
 }

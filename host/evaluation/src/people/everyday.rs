@@ -8,10 +8,7 @@ use farnear_recognition::classifier::Classifier;
 use farnear_recognition::clip::{Clip, Track};
 use farnear_recognition::embedding::descriptor::Scaling;
 use farnear_recognition::evaluation::{
-    calibration::Reliability,
-    confusion::{Confusion, wilson},
-    leave_one_out::EvaluationError,
-    open_set::open_set,
+    calibration::Reliability, confusion::Confusion, leave_one_out::EvaluationError, open_set::open_set,
 };
 use farnear_recognition::experiment::Experiment;
 use farnear_recognition::frames::Mode;
@@ -212,8 +209,7 @@ fn row(model: &Recogniser, names: [&str; 3], clips: &[Clip]) -> Result<Vec<Strin
     let share = |count: usize, of: usize| format!("{:.1}", 100.0 * count as f64 / of.max(1) as f64);
     let with_interval = |confusion: &Confusion| {
         // Views are not independent: as many trials as clips.
-        let (low, high) =
-            wilson((confusion.accuracy() * clips.len() as f64).round() as u32, clips.len() as u32, 1.96);
+        let (low, high) = confusion.interval(clips.len() as u32);
         format!("{:.1} ({:.1} to {:.1})", 100.0 * confusion.accuracy(), 100.0 * low, 100.0 * high)
     };
     let mut cells: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();

@@ -3,7 +3,7 @@
 use anyhow::{Context, Result};
 use farnear_recognition::classifier::Family;
 use farnear_recognition::evaluation::{
-    confusion::{Confusion, wilson},
+    confusion::Confusion,
     leave_one_out::{Outcome, leave_one_subject_out},
 };
 use farnear_recognition::experiment::{Experiment, Sweep};
@@ -161,6 +161,5 @@ fn accuracy(confusion: &Confusion, set: &Set) -> String {
 fn interval(confusion: &Confusion, set: &Set) -> (f64, f64) {
     // A set with its mirrors has every performance twice.
     let trials = set.clips.len() / if set.mirror { 1 } else { 2 };
-    let right = (confusion.accuracy() * trials as f64).round();
-    wilson(right as u32, trials as u32, 1.96)
+    confusion.interval(trials as u32)
 }

@@ -2,10 +2,7 @@
 
 use anyhow::{Context, Result};
 use farnear_recognition::classifier::ClassifierKind;
-use farnear_recognition::evaluation::{
-    confusion::{Confusion, wilson},
-    leave_one_out::leave_one_subject_out,
-};
+use farnear_recognition::evaluation::{confusion::Confusion, leave_one_out::leave_one_subject_out};
 use farnear_recognition::experiment::{Experiment, Sweep};
 use farnear_recognition::frames::Mode;
 use farnear_recognition::space::{Layout, PatternKind, SpaceSettings};
@@ -169,9 +166,8 @@ fn compared(page: &mut Page, set: &Set, thesis: &[(&str, f64)], thesis_mean: f64
     let trials = (set.clips.len() / if set.mirror { 1 } else { 2 }) as u32;
     let mut last = vec!["all".to_owned(), format!("{thesis_mean:.1}")];
     last.extend(columns.iter().map(|(_, confusion)| {
-        let share = confusion.accuracy();
-        let (low, high) = wilson((share * f64::from(trials)).round() as u32, trials, 1.96);
-        format!("{:.1} ({:.1} to {:.1})", 100.0 * share, 100.0 * low, 100.0 * high)
+        let (low, high) = confusion.interval(trials);
+        format!("{:.1} ({:.1} to {:.1})", 100.0 * confusion.accuracy(), 100.0 * low, 100.0 * high)
     }));
     rows.push(last);
     let mut head = vec!["activity", "thesis, %"];

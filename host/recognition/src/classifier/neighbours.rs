@@ -56,7 +56,8 @@ impl Method for Neighbours {
 }
 
 /// Votes of the `k` smallest (squared distance, class): 1 each, plus a small bonus that decides ties. Every class has a
-/// trace of a vote, larger for nearer ones, which decides where answers are restricted to classes without votes.
+/// trace of a vote, larger for nearer ones, which decides where answers are restricted to classes without votes. It is too
+/// small to count where views are fused.
 fn vote(mut distances: Vec<(f32, usize)>, classes: usize, k: usize) -> Vec<f32> {
     distances.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut votes = vec![0.0; classes];
@@ -64,7 +65,7 @@ fn vote(mut distances: Vec<(f32, usize)>, classes: usize, k: usize) -> Vec<f32> 
     for (rank, &(_, label)) in distances.iter().enumerate() {
         if votes[label] == 0.0 {
             seen += 1.0;
-            votes[label] = 1e-6 / seen;
+            votes[label] = 1e-9 / seen;
         }
         if rank < k.max(1) {
             votes[label] += 1.0 + 1e-3 / (1.0 + rank as f32);

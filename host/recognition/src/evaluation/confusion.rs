@@ -45,7 +45,7 @@ impl Confusion {
     /// Wilson's interval of the accuracy at 95 % (E. B. Wilson, JASA 22, 1927) for this number of independent
     /// trials: fewer than the answers if several views of a clip count.
     pub fn interval(&self, trials: u32) -> (f64, f64) {
-        wilson_of_share(self.accuracy(), trials, 1.96)
+        wilson(self.accuracy(), trials, 1.96)
     }
 
     /// Markdown table in per cent of each truth, as the thesis' tables 9.1 to 9.3.
@@ -64,13 +64,9 @@ impl Confusion {
     }
 }
 
-/// Wilson's score interval of `right` of `of` at `z` standard deviations; (0, 1) without clips.
-pub fn wilson(right: u32, of: u32, z: f64) -> (f64, f64) {
-    wilson_of_share(f64::from(right) / f64::from(of), of, z)
-}
-
-/// [`wilson`] for a share of right answers, 0 to 1.
-pub fn wilson_of_share(share: f64, of: u32, z: f64) -> (f64, f64) {
+/// Wilson's score interval of a share of right answers, 0 to 1, in `of` independent trials, at `z` standard deviations;
+/// (0, 1) without trials.
+pub fn wilson(share: f64, of: u32, z: f64) -> (f64, f64) {
     if of == 0 {
         return (0.0, 1.0);
     }
@@ -87,11 +83,11 @@ mod tests {
     #[test]
     fn wilson_has_its_published_values() {
         // Newcombe, Statistics in Medicine 17 (1998), table I: 81/263 and 15/148 by the score method.
-        let (low, high) = wilson(81, 263, 1.959_964);
+        let (low, high) = wilson(81.0 / 263.0, 263, 1.959_964);
         assert!((low - 0.2553).abs() < 1e-4 && (high - 0.3662).abs() < 1e-4);
-        let (low, high) = wilson(15, 148, 1.959_964);
+        let (low, high) = wilson(15.0 / 148.0, 148, 1.959_964);
         assert!((low - 0.0624).abs() < 1e-4 && (high - 0.1605).abs() < 1e-4);
-        assert_eq!(wilson(0, 0, 1.96), (0.0, 1.0));
+        assert_eq!(wilson(0.0, 0, 1.96), (0.0, 1.0));
     }
 
     #[test]
@@ -102,8 +98,7 @@ mod tests {
         matrix.count(1, 1);
         assert_eq!(matrix.right_of(), (2, 3));
         // Three views of one clip are one trial.
-        assert_eq!(matrix.interval(3), wilson(2, 3, 1.96));
-        assert_eq!(matrix.interval(1), wilson_of_share(2.0 / 3.0, 1, 1.96));
+        assert_eq!(matrix.interval(3), wilson(2.0 / 3.0, 3, 1.96));
         assert!(matrix.interval(1).0 < matrix.interval(3).0);
         assert!(matrix.to_markdown().contains("| walk | 50.0 | 50.0 |"));
     }

@@ -211,7 +211,7 @@ fn one_fold(
 }
 
 /// Class of the largest product of a clip's and its mirror's probabilities. As in a model's joint answers, a
-/// probability of 0 does not exclude a class: nearest neighbours give 0 to all but a few.
+/// probability of 0 does not exclude a class: nearest neighbours give next to none to all but a few.
 fn joint_answer(clip: &[f32], mirror: Option<&[f32]>) -> usize {
     const LEAST: f32 = 1e-9;
     let Some(mirror) = mirror else { return largest(clip).0 };

@@ -2,7 +2,7 @@
 //! another subject does not perform.
 
 use std::{
-    collections::{BTreeMap, BTreeSet, HashMap, hash_map::Entry},
+    collections::{BTreeMap, BTreeSet, HashMap, HashSet, hash_map::Entry},
     hash::{DefaultHasher, Hash, Hasher},
 };
 
@@ -75,8 +75,13 @@ fn equal<'a>(clips: impl Iterator<Item = &'a Clip>) -> (usize, Option<[&'a Clip;
 
 /// Activities of tested clips that no other subject's clips teach.
 pub(super) fn untaught(tested: &[Clip], learned: &[Clip]) -> Vec<String> {
+    let mut teachers: HashMap<&str, HashSet<&str>> = HashMap::new();
+    for clip in learned {
+        teachers.entry(&clip.activity).or_default().insert(&clip.subject);
+    }
     let is_taught = |clip: &Clip| {
-        learned.iter().any(|other| other.activity == clip.activity && other.subject != clip.subject)
+        let of = teachers.get(clip.activity.as_str());
+        of.is_some_and(|of| of.iter().any(|teacher| *teacher != clip.subject))
     };
     names(tested.iter().filter(|clip| !is_taught(clip)).map(|clip| &clip.activity))
 }

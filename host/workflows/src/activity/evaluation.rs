@@ -101,8 +101,7 @@ pub(super) fn evaluate(
     let untaught = doubts::untaught(&test, learned);
     if !untaught.is_empty() {
         context.progress.warn(&format!(
-            "{}: performed by one subject only, whose clips are counted as wrong: the others do not teach it; add clips of a \
-             second subject, or leave these out",
+            "{}: taught by one subject only, whose own clips count as wrong: add clips of a second subject, or leave these out",
             untaught.join(", ")
         ));
     }

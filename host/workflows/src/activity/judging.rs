@@ -7,7 +7,7 @@ use farnear_recognition::choice::Views;
 use farnear_recognition::clip::{Clip, Track};
 use farnear_recognition::evaluation::{
     calibration::{Reliability, area_under_roc},
-    confusion::{Confusion, wilson_of_share},
+    confusion::{Confusion, wilson},
 };
 use farnear_recognition::model::{Answer, Recogniser};
 use farnear_recognition::self_training::ROUNDS;
@@ -143,8 +143,10 @@ pub(super) fn warn_of_learned(
     samples: &Samples,
     context: &Context<'_>,
 ) -> Result<()> {
-    let learned =
-        samples.clips.par_iter().map(|clip| recogniser.has_learned(&clip.views).map_err(WorkflowError::from));
+    let learned = samples.clips.par_iter().map(|clip| {
+        context.cancel.check("evaluating")?;
+        recogniser.has_learned(&clip.views).map_err(WorkflowError::from)
+    });
     let count = learned.collect::<Result<Vec<bool>>>()?.into_iter().filter(|learned| *learned).count();
     if count > 0 {
         context.progress.warn(&format!(
@@ -237,7 +239,7 @@ fn figures(known: &[Judged], strange: &[Judged], among: &[String], not_known: Ve
     let answers = known.len() as u32;
     let accuracy = f64::from(right) / f64::from(answers);
     let clips = known.iter().filter(|judged| judged.view == 1).count() as u32;
-    let (low, high) = wilson_of_share(accuracy, clips, 1.96);
+    let (low, high) = wilson(accuracy, clips, 1.96);
     let (low_among, high_among) = confusion.interval(clips);
     let any = !strange.is_empty();
     JudgingFigures {

@@ -240,13 +240,8 @@ fn train(request: &TrainRequest, context: &Context<'_>) -> Result<TrainingFigure
 
 /// Activities of one subject, where there are several subjects.
 fn of_one_subject(clips: &[Clip]) -> Vec<String> {
-    let subjects = |activity: Option<&String>| {
-        let of = clips.iter().filter(|clip| activity.is_none_or(|activity| clip.activity == *activity));
-        names(of.map(|clip| &clip.subject)).len()
-    };
-    let mut activities = names(clips.iter().map(|clip| &clip.activity));
-    activities.retain(|activity| subjects(Some(activity)) == 1 && subjects(None) > 1);
-    activities
+    let several = names(clips.iter().map(|clip| &clip.subject)).len() > 1;
+    if several { doubts::untaught(clips, clips) } else { Vec::new() }
 }
 
 /// Why clips of a single subject give no limit for unknown; `numbers` are those of their performances.

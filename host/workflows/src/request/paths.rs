@@ -1,10 +1,28 @@
 //! Files in a request's texts.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use serde_json::Value;
+use serde_json::{Map, Value};
 
-use super::PathKind;
+use super::{PathKind, Task};
+
+impl Task {
+    /// Files that a job with these fields may read, also those that do not exist yet.
+    pub fn files(&self, fields: &Map<String, Value>, base: &Path) -> Vec<PathBuf> {
+        let mut found = Vec::new();
+        for (name, kind) in self.paths {
+            let texts: Vec<&str> = match fields.get(*name) {
+                _ if matches!(kind, PathKind::OutputFile | PathKind::OutputFolder) => Vec::new(),
+                // The text may be a list.
+                Some(Value::String(text)) => std::iter::once(text.as_str()).chain(text.split(';')).collect(),
+                Some(Value::Array(list)) => list.iter().filter_map(Value::as_str).collect(),
+                _ => Vec::new(),
+            };
+            found.extend(texts.into_iter().map(|text| base.join(file_part(text.trim(), *kind))));
+        }
+        found
+    }
+}
 
 pub(super) fn file_part(text: &str, kind: PathKind) -> &str {
     match kind {
@@ -52,6 +70,26 @@ mod tests {
             rebase(&mut value, PathKind::NamedInput, Path::new("/base"));
             assert_eq!(value, json!([expected]));
         }
+    }
+
+    #[test]
+    fn files_of_a_job_need_not_exist() {
+        let task = Task {
+            name: "sample",
+            schema: || Value::Null,
+            required: &[],
+            paths: &[
+                ("views", PathKind::Input),
+                ("psf", PathKind::InputOrName),
+                ("clip", PathKind::NamedInput),
+                ("out", PathKind::OutputFolder),
+            ],
+            job: |_, _| unreachable!("no job is read"),
+        };
+        let fields = json!({"views": "a; b", "psf": "k.toml,k=1", "clip": ["walk=c.bvh"], "out": "d"});
+        let found = task.files(fields.as_object().expect("an object"), Path::new("/base"));
+        let wanted = ["/base/a; b", "/base/a", "/base/b", "/base/k.toml", "/base/k.toml", "/base/c.bvh"];
+        assert_eq!(found, wanted.map(PathBuf::from));
     }
 
     #[test]

@@ -239,11 +239,17 @@ fn distances(asked_mm: &[f64], optics: &Optics) -> Result<Vec<f64>> {
     let range = optics.working_range();
     let usable = |mm: f64| mm.is_finite() && optics.alpha(mm).abs() <= LARGEST_ALPHA;
     if let Some(bad) = asked_mm.iter().find(|mm| !usable(**mm)) {
-        let [nearest, farthest] = [LARGEST_ALPHA, -LARGEST_ALPHA].map(|alpha| optics.depth_mm(alpha));
+        let [farthest, nearest] = optics.range_mm(LARGEST_ALPHA);
         // Inwards, to three digits of the range.
-        let scale = 10_f64.powf(2.0 - (farthest - nearest).log10().floor());
+        let span = if farthest.is_finite() { farthest - nearest } else { nearest };
+        let scale = 10_f64.powf(2.0 - span.log10().floor());
         let [nearest, farthest] = [(scale * nearest).ceil() / scale, (scale * farthest).floor() / scale];
-        let expected = format!("expected {nearest} to {farthest} mm, the range of the optics");
+        let wanted = if farthest.is_finite() {
+            format!("{nearest} to {farthest} mm")
+        } else {
+            format!("at least {nearest} mm")
+        };
+        let expected = format!("expected {wanted}, the range of the optics");
         return Err(WorkflowError::parameter("distances", bad, expected));
     }
     if !asked_mm.is_empty() {
@@ -294,6 +300,10 @@ mod tests {
             let error = error.to_string();
             assert!(error.starts_with(&format!("distances {wrong}: expected 884.7 to 935.4 mm")), "{error}");
         }
+        let distant = "[lens]\nfocal_length_mm = 8.0\nf_number = 1.6\n[sensor]\npixel_um = 5.0\n[focus]\nfar_mm = 30000.0\nnear_mm = 1000.0\n";
+        let optics = GivenOptics::parse(distant, Path::new("optics.toml")).unwrap().optics;
+        let error = distances(&[900.0], &optics).unwrap_err().to_string();
+        assert!(error.contains("expected at least 955 mm"), "{error}");
     }
 
     #[test]

@@ -54,9 +54,8 @@ const PERHAPS_PEOPLE: [&str; 12] = [
 ];
 /// A recording has fewer people; more are those of a collection of recordings.
 const MOST_PEOPLE: usize = 16;
-/// Ends of names that state the unit of their times, and the units in a second.
-const STATED: [(&str, f64); 6] =
-    [("_s", 1.0), ("(s)", 1.0), ("[s]", 1.0), ("_sec", 1.0), ("_ms", 1e3), ("_us", 1e6)];
+/// What follows `time` or `timestamp` in names that state the unit of their times, and the units in a second.
+const STATED: [(&str, f64); 4] = [("s", 1.0), ("sec", 1.0), ("ms", 1e3), ("us", 1e6)];
 /// Longest steps of times without a stated unit, and the units in a second: seconds, milliseconds, microseconds, 100 ns (Kinect).
 /// Longer steps are nanoseconds.
 const UNITS: [(f64, f64); 4] = [(2.0, 1.0), (2e3, 1e3), (2e5, 1e6), (2e6, 1e7)];
@@ -119,8 +118,9 @@ pub fn rate_hz(columns: &StringRecord, rows: &[StringRecord]) -> Option<f64> {
     let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
     steps.sort_unstable_by(f64::total_cmp);
     let step = steps.get(steps.len() / 2).copied()?;
-    let name = columns.get(column)?.to_ascii_lowercase();
-    let per_second = match STATED.iter().find(|(end, _)| name.ends_with(*end)) {
+    let name = simple(columns.get(column)?);
+    let unit = ["timestamp", "time"].into_iter().find_map(|word| name.strip_prefix(word));
+    let per_second = match STATED.iter().find(|(stated, _)| unit == Some(*stated)) {
         Some((_, units)) => *units,
         None => UNITS.iter().find(|(most, _)| step <= *most).map_or(1e9, |(_, units)| *units),
     };
@@ -141,6 +141,8 @@ mod tests {
         for (column, step) in [
             ("time_s", 0.04),
             ("Time [s]", 0.04),
+            ("time (ms)", 40.0),
+            ("TimestampUs", 40_000.0),
             ("timestamp_ms", 40.0),
             ("timestamp", 40_000.0),
             ("Timestamp", 400_000.0),

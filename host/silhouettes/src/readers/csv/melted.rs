@@ -2,13 +2,13 @@
 //! the name of the value (`nose_x`, or `x` next to a point) and the value. They become tables with a column for each name. Linear in
 //! the file.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 use csv::StringRecord;
 
 use super::{
     check_width,
-    columns::{CONFIDENCES, FRAMES, TIMES, is_of, people, place},
+    columns::{FRAMES, TIMES, is_of, people, place},
     coordinate, line,
     long::{check_cells, point_column},
     unseparated,
@@ -17,7 +17,6 @@ use crate::readers::recording::RecordingError;
 
 /// What columns of values' names are called.
 const NAMES: [&str; 8] = ["variable", "name", "key", "measure", "coords", "coord", "coordinate", "axis"];
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// The cells that tell a group from others, and the number of values of its names before it.
 type Key<'a> = (Vec<&'a str>, usize);
@@ -40,8 +39,8 @@ pub fn cast(rows: Vec<StringRecord>) -> Result<Vec<StringRecord>, RecordingError
     }
     let has_points = header.iter().any(|column| point_column(column).is_some());
     let has_axes = |at: &usize| {
-        let cells: HashSet<&str> = below.iter().filter_map(|row| row.get(*at)).collect();
-        cells.into_iter().all(|cell| is_of(cell, &AXES) || is_of(cell, &CONFIDENCES))
+        let has = |axis: &str| below.iter().any(|row| row.get(*at).is_some_and(|cell| is_of(cell, &[axis])));
+        has("x") && has("y")
     };
     let axis = named.iter().copied().find(has_axes).filter(|_| !has_points);
     // Next to an axis, another name is that of a point.
