@@ -1,8 +1,6 @@
 //! Isomap and the map that embeds new samples.
 
-use farnear_recognition::embedding::{
-    EmbeddingError, isomap::isomap as lay_out, neighbours::Neighbourhood, rbf,
-};
+use farnear_recognition::embedding::{EmbeddingError, isomap::isomap as lay_out, rbf};
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 
@@ -25,7 +23,7 @@ pub fn isomap<'py>(
     dimensions: usize,
 ) -> PyResult<Laid<'py>> {
     let samples = samples.view();
-    let found = work::run(py, || lay_out(samples, Neighbourhood::Nearest(neighbours), dimensions))?;
+    let found = work::run(py, || lay_out(samples, neighbours, dimensions))?;
     let found = found.map_err(|error| match &error {
         EmbeddingError::Disconnected { .. } => DisconnectedError::new_err(error.to_string()),
         _ => wrong(error),

@@ -292,7 +292,8 @@ fn levels(percent: Option<[f64; 2]>) -> PyResult<Option<LightLevels>> {
 }
 
 fn open(address: &CameraAddress) -> Result<Box<dyn farnear_capture::camera::Camera>, Failed> {
-    address.open()?.ok_or_else(|| Failed("there is no camera".into()))
+    let camera = address.open()?.ok_or_else(|| Failed("there is no camera".into()))?;
+    Ok(camera)
 }
 
 fn of_axis<'py>(py: Python<'py>, status: &AxisStatus) -> PyResult<Bound<'py, PyDict>> {

@@ -10,6 +10,7 @@ use anyhow::{Context, Result};
 use crate::{
     limited,
     run::{ROOT, target_folder},
+    test_programs::Total,
 };
 
 /// Used if `CHROMIUM` is not set.
@@ -17,23 +18,15 @@ const BROWSERS: [&str; 3] = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "
 
 const TESTS: [&str; 3] = ["page.test.mjs", "rows.test.mjs", "results.test.mjs"];
 
-#[derive(Default)]
-pub struct Counts {
-    pub passed: u32,
-    pub failed: u32,
-    pub skipped: u32,
-    pub ended_well: bool,
-}
-
 /// Counts the tests as skipped if tools are missing.
-pub fn run() -> Result<Counts> {
+pub fn run() -> Result<Total> {
     let folder = &ROOT.join("host/serve/tests-browser");
     if let Some(missing) = missing(folder) {
         let read =
             |name: &str| std::fs::read_to_string(folder.join(name)).context("the page's tests are not there");
         let text = TESTS.into_iter().map(read).collect::<Result<String>>()?;
         eprintln!("skipped: the page in a browser ({missing})");
-        return Ok(Counts { skipped: written(&text), ended_well: true, ..Counts::default() });
+        return Ok(Total { ignored: written(&text), well: true, ..Total::default() });
     }
     let ended = limited::run(
         Command::new("node")
@@ -43,11 +36,12 @@ pub fn run() -> Result<Counts> {
             .env("FARNEAR", target_folder().join("debug/farnear")),
     )?;
     let count = |name| number(&ended.text, name);
-    Ok(Counts {
+    Ok(Total {
         passed: count("pass"),
         failed: count("fail"),
-        skipped: count("skipped"),
-        ended_well: ended.well,
+        ignored: count("skipped"),
+        well: ended.well,
+        ..Total::default()
     })
 }
 

@@ -24,6 +24,6 @@ pub fn build_release() -> Result<PathBuf> {
     Ok(target_folder().join("release"))
 }
 
-fn packages<'a>(programs: &'a [&str]) -> impl Iterator<Item = &'a str> {
+pub fn packages<'a>(programs: &'a [&str]) -> impl Iterator<Item = &'a str> {
     programs.iter().flat_map(|program| ["--package", program])
 }

@@ -9,10 +9,9 @@ use std::{
 use anyhow::{Context, Result};
 
 use crate::{
-    browser::Counts,
     limited,
     run::{ROOT, cargo, features, finish, succeeds, target_folder},
-    test_programs,
+    test_programs::{self, Total},
 };
 
 /// Compiled only if Python is available.
@@ -38,14 +37,14 @@ const NEEDS: [&str; 13] = [
 const ABLE: &str = "import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 9))";
 
 /// Counts the tests as skipped if tools are missing.
-pub fn run(elf: &Path) -> Result<Counts> {
+pub fn run(elf: &Path) -> Result<Total> {
     let tests = ROOT.join("python/tests");
     let folder = target_folder().join("python-tests");
     let python = match environment(&folder, &NEEDS) {
         Ok(python) => python,
         Err(missing) => {
             eprintln!("skipped: the Python package ({missing})");
-            return Ok(Counts { skipped: written(&tests)?, ended_well: true, ..Counts::default() });
+            return Ok(Total { ignored: written(&tests)?, well: true, ..Total::default() });
         }
     };
     let built = target_folder().join("debug");
@@ -65,11 +64,12 @@ pub fn run(elf: &Path) -> Result<Counts> {
             .env("FARNEAR_FIRMWARE", elf),
     )?;
     let text = ended.text;
-    Ok(Counts {
+    Ok(Total {
         passed: count(&text, "passed"),
         failed: count(&text, "failed") + count(&text, "error") + count(&text, "errors"),
-        skipped: count(&text, "skipped"),
-        ended_well: ended.well,
+        ignored: count(&text, "skipped"),
+        well: ended.well,
+        ..Total::default()
     })
 }
 

@@ -7,8 +7,7 @@ use anyhow::{Result, bail};
 use crate::{
     arm,
     boards::BOARDS,
-    browser::{self, Counts},
-    firmware, instructions, python,
+    browser, firmware, instructions, python,
     run::{cargo, features, finish, step},
     sizes,
     test_programs::{Programs, Total},
@@ -64,9 +63,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     // Each spends half of its time waiting. Output is printed at the end.
     let beside = || -> Result<Total> {
         let mut total = Total { well: true, ..Total::default() };
-        add(&mut total, &browser::run()?);
+        total.add(&browser::run()?);
         arm::run(&mut total)?;
-        add(&mut total, &python::run(&elf)?);
+        total.add(&python::run(&elf)?);
         Ok(total)
     };
     let (programs, beside) = thread::scope(|scope| {
@@ -88,11 +87,4 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         bail!("tests failed");
     }
     Ok(())
-}
-
-fn add(total: &mut Total, counts: &Counts) {
-    total.passed += counts.passed;
-    total.failed += counts.failed;
-    total.ignored += counts.skipped;
-    total.well &= counts.ended_well;
 }

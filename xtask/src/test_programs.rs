@@ -14,12 +14,11 @@ use anyhow::{Context, Result, bail};
 use serde_json::Value;
 
 use crate::{
+    host::PROGRAMS,
     limited, python,
     run::{ROOT, cargo, features, finish, output, target_folder},
 };
 
-/// Packages whose tests run the programs or the firmware; others depend on their own files only.
-const RUN_PROGRAMS: [&str; 3] = ["farnear", "farnear-sim", "farnear-campaign"];
 /// Its tests read the whole repository.
 const SEES_EVERYTHING: &str = "xtask";
 /// Relative to the repository's root; see `tools/test-data`.
@@ -148,7 +147,8 @@ pub fn environment<'a>(command: &'a mut Command, elf: &Path) -> &'a mut Command 
 fn dependencies(test: &Program, programs: &[PathBuf], elf: &Path) -> Result<String> {
     let mut hasher = DefaultHasher::new();
     hash_file(&test.executable, &mut hasher)?;
-    if RUN_PROGRAMS.contains(&test.package.as_str()) {
+    // Their tests run the programs or the firmware; others depend on their own files only.
+    if PROGRAMS.contains(&test.package.as_str()) {
         for program in programs.iter().map(PathBuf::as_path).chain([elf]) {
             hash_file(program, &mut hasher)?;
         }

@@ -27,6 +27,11 @@ fn put(levels: LightLevels) {
     timer.egr().write(|w| w.set_ug(true));
 }
 
+/// Before a reset without control loop, from any interrupt.
+pub fn off() {
+    put(LightLevels::OFF);
+}
+
 pub fn begin_flash(levels: LightLevels) {
     critical_section::with(|cs| {
         let steady = STEADY.borrow(cs);

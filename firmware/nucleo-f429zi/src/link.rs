@@ -19,6 +19,7 @@ use embassy_stm32::{
     usart::{self, ConfigError, Uart},
 };
 use farnear_protocol::{frame::FRAME_MAX, message::LinkRate};
+use farnear_rig::ring::{self, Lap};
 
 use crate::clock::APB1_TIMER_HZ;
 
@@ -75,17 +76,21 @@ impl Link {
     /// Passes received bytes; `true` if some were lost in a full ring. Call once per tick, also to continue sending.
     pub fn drain(&mut self, mut take: impl FnMut(u8)) -> bool {
         self.hand_over();
-        let (end, lapped) = received();
-        // Only if the transfer wrapped and passed unread bytes.
-        let full = lapped && end >= self.taken;
-        if full {
+        // The order matters: flag, place, bytes, clearing.
+        let flag = pac::DMA1.isr(RECEIVE_STREAM / 4).read().tcif(RECEIVE_STREAM % 4);
+        let end = received();
+        let lap = ring::lap(flag, self.taken, end);
+        if lap == Lap::Lost {
             self.taken = end;
         }
         while self.taken != end {
             take(RECEIVED[self.taken].load(Ordering::Relaxed));
             self.taken = (self.taken + 1) % RECEIVE_RING;
         }
-        full
+        if lap != Lap::Unfinished {
+            clear(RECEIVE_STREAM);
+        }
+        lap == Lap::Lost
     }
 
     pub const fn has_room(&self) -> bool {
@@ -170,25 +175,14 @@ fn is_running(stream: usize) -> bool {
     pac::DMA1.st(stream).cr().read().en()
 }
 
-/// End of the received bytes, and whether the ring wrapped since the last call.
-fn received() -> (usize, bool) {
-    let left = || usize::from(pac::DMA1.st(RECEIVE_STREAM).ndtr().read().ndt());
-    loop {
-        let before = left();
-        let lapped = pac::DMA1.isr(RECEIVE_STREAM / 4).read().tcif(RECEIVE_STREAM % 4);
-        // The count falls; a rise means that it wrapped in between, with the flag in either state.
-        if left() <= before {
-            if lapped {
-                clear(RECEIVE_STREAM);
-            }
-            // An error flag is cleared by reading it, then the data. The DMA does that with the next byte,
-            // which may not come after an overrun. The byte taken here belongs to a frame that is lost
-            // already.
-            if pac::USART3.sr().read().ore() {
-                let _ = pac::USART3.dr().read();
-            }
-            fence(Ordering::Acquire);
-            return ((RECEIVE_RING - before) % RECEIVE_RING, lapped);
-        }
+/// End of the received bytes.
+fn received() -> usize {
+    let left = usize::from(pac::DMA1.st(RECEIVE_STREAM).ndtr().read().ndt());
+    // An error flag is cleared by reading it, then the data. The DMA does that with the next byte, which may not
+    // come after an overrun. The byte taken here belongs to a frame that is lost already.
+    if pac::USART3.sr().read().ore() {
+        let _ = pac::USART3.dr().read();
     }
+    fence(Ordering::Acquire);
+    (RECEIVE_RING - left) % RECEIVE_RING
 }

@@ -98,6 +98,9 @@ fn tell_of(last: Option<Last>) {
 #[embassy_executor::main]
 async fn main(_spawner: Spawner) {
     let reset_cause = registers::take_reset_cause();
+    let piezo_code = kept_piezo_code(reset_cause);
+    // Memory may outlast the DAC, and a failing clock must not return to its code.
+    retained::set_piezo_code(piezo_code);
     let (boot, last) = retained::take();
     count_cycles();
     let (peripherals, own_clock) = clock::start(last == Some(Last::ClockLost));
@@ -122,7 +125,7 @@ async fn main(_spawner: Spawner) {
         firmware: env!("CARGO_PKG_VERSION"),
         unique_id: uid::uid(),
         boot,
-        piezo_code: kept_piezo_code(reset_cause),
+        piezo_code,
         reset_cause,
         own_clock,
         emulated,

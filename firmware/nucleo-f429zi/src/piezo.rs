@@ -21,7 +21,7 @@ use embassy_stm32::{
     spi::{self, MODE_0, Spi, mode::Master},
     time::Hertz,
 };
-use farnear_rig::io::GAUGE_CODE_MAX;
+use farnear_rig::{io::GAUGE_CODE_MAX, relax};
 
 use crate::{clock, registers::retained};
 
@@ -39,6 +39,10 @@ const BUSY_BIT: u32 = 1 << 31;
 const TRAILING_BITS: u32 = 13;
 /// Control ticks (5 ms) between repetitions of the DAC's code, which a loose contact or supply dip may have lost.
 const AGAIN_TICKS: u8 = 25;
+/// A tick's 200 us in steps of TIM5, which take 10.5 us on the internal oscillator: 16 MHz by 2 by 84.
+const TICK_STEPS: u16 = 19;
+/// Pin of the DAC's select at port D.
+const DAC_SELECT: usize = 0;
 /// Converts two's complement to 0 = most negative.
 const SIGN_BIT: u32 = 1 << 17;
 
@@ -73,13 +77,6 @@ impl Piezo {
         Self { _spi: spi, dac_select, convert, code: None, silent_ticks: 0, sampled: 0 }
     }
 
-    fn exchange(&mut self, word: u16) -> u16 {
-        pac::SPI3.dr().write(|w| w.set_dr(word));
-        clock::wait_cycles(WORD_CYCLES);
-        while !pac::SPI3.sr().read().rxne() {}
-        pac::SPI3.dr().read().dr()
-    }
-
     pub fn sample(&mut self) {
         // An interrupt in between would make the pulse longer than a conversion and lose the indicator.
         critical_section::with(|_| {
@@ -93,7 +90,7 @@ impl Piezo {
     /// The last sample, 0 to [`GAUGE_CODE_MAX`]; `None` if the converter is silent. Takes 3.8 us.
     pub fn gauge(&mut self) -> Option<u32> {
         clock::wait_cycles_since(self.sampled, CONVERSION_CYCLES);
-        let word = u32::from(self.exchange(0)) << 16 | u32::from(self.exchange(0));
+        let word = u32::from(exchange(0)) << 16 | u32::from(exchange(0));
         let code = (word >> TRAILING_BITS) & GAUGE_CODE_MAX;
         (word & BUSY_BIT == 0).then_some(code ^ SIGN_BIT)
     }
@@ -107,8 +104,40 @@ impl Piezo {
         self.silent_ticks = 0;
         retained::keep_piezo_code(code);
         self.dac_select.set_low();
-        self.exchange(code);
+        exchange(code);
         self.dac_select.set_high();
         self.code = Some(code);
+    }
+}
+
+// Inlined it would be there four times.
+#[inline(never)]
+fn exchange(word: u16) -> u16 {
+    pac::SPI3.dr().write(|w| w.set_dr(word));
+    clock::wait_cycles(WORD_CYCLES);
+    while !pac::SPI3.sr().read().rxne() {}
+    pac::SPI3.dr().read().dr()
+}
+
+/// From the interrupt of a lost clock, which never returns: lowers the piezo as a sinking supply does, because the
+/// supply may end before the start after the reset reaches its first tick.
+pub fn release() {
+    // Before the set-up the interface is off or has words of 8 bits, and the last boot's code is still at the DAC.
+    let interface = pac::SPI3.cr1().read();
+    let is_ready = interface.spe() && interface.dff() == pac::spi::vals::Dff::BITS16;
+    let (Some(from), true) = (retained::piezo_code(), is_ready) else { return };
+    let select = pac::GPIOD.bsrr();
+    let steps = || pac::TIM5.cnt().read() as u16;
+    let begin = steps();
+    for at in 1..=relax::FAST {
+        while steps().wrapping_sub(begin) < at as u16 * TICK_STEPS {}
+        // A word that the interrupt cut off is over by now; a rising select ends it.
+        let _ = pac::SPI3.dr().read();
+        select.write(|w| w.set_bs(DAC_SELECT, true));
+        let code = relax::code(from, 0, at, relax::FAST);
+        retained::keep_piezo_code(code);
+        select.write(|w| w.set_br(DAC_SELECT, true));
+        exchange(code);
+        select.write(|w| w.set_bs(DAC_SELECT, true));
     }
 }

@@ -25,7 +25,7 @@ impl Events {
         self.next.saturating_sub(RETAINED)
     }
 
-    /// Numbers would overflow after 2^32 events, years at a thousand a second.
+    /// Numbers end after 2^32 events, 50 days at a thousand a second: nothing is sent then until a reset.
     pub(crate) fn push(&mut self, time: BoardMicros, kind: EventKind) {
         self.ring[(self.next % RETAINED) as usize] = Some(Event { time, kind });
         self.next = self.next.saturating_add(1);

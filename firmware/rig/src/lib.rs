@@ -5,7 +5,7 @@
 //! outputs and bytes 5000 times a second. A board implements only [`control::Board`].
 //!
 //! ```text
-//! control    a board's loop: read, decide, apply, send, feed the watchdog
+//! control    a board's loop: read, decide, apply, send, feed the watchdog     ring: laps of its receive buffer
 //! rig        a tick: alarms, stored state                           identity, settings: who, with what numbers
 //! |- session    bytes <-> requests and answers; acts once
 //! |- requests   checks and start of each request                       report: hello and status
@@ -24,7 +24,7 @@
 //!    |- axis       feeds a step timer, counts, checks encoder, switches and driver
 //!    |  '- ramp, steps    jerk-limited segments; nanometres <-> pulses
 //!    '- piezo      input shaping, observer, state feedback on the strain gauge, the calibrated model
-//!       '- shaper, gains, matrix    gains from physical numbers at compile time
+//!       '- shaper, gains, matrix    gains from physical numbers at compile time      relax: the ramp down
 //! ```
 //!
 //! Goals: no input can cause a panic or exceed the limits; a position is valid only while steps and encoder agree; long
@@ -59,9 +59,11 @@ pub mod notes;
 mod piezo;
 pub mod program;
 mod progress;
+pub mod relax;
 mod report;
 mod requests;
 mod rig;
+pub mod ring;
 pub mod session;
 pub mod settings;
 mod shaper;

@@ -26,6 +26,7 @@ use self::model::{GaugeScale, Lag, Scale};
 use self::trend::Trend;
 use crate::gains::{GAIN_BITS, Gains};
 use crate::io::{GAUGE_CODE_MAX, GAUGE_CODE_ZERO, TICK_HZ, TICK_US};
+use crate::relax;
 use crate::settings::FineSettings;
 use crate::shaper::Shaper;
 
@@ -54,8 +55,6 @@ const INNOVATION_CLIP: i32 = 2 * INNOVATION_LIMIT;
 const UNREACHABLE: i32 = 40_000 << BITS;
 /// Ticks of a ramp after a start or a failure, and the codes (3 um) below which none is needed.
 const RAMP: u32 = TICK_HZ / 10;
-/// Ticks of the lowering while the supply sinks: 4.4 of the 4.8 ms that are left (docs/rig.md).
-const RELAX_FAST: u32 = 22;
 const RELAXED: u16 = 1_000;
 
 /// A piezo whose loop has opened, or whose DAC has dropped with the power, swings freely. At 200 Hz and a damping of 3 %
@@ -372,20 +371,15 @@ impl Piezo {
             return;
         }
         (self.control, self.closing, self.driven) = (None, false, false);
-        self.start = Start::Ramp { from: self.code, to: 0, ticks: 0, over: RELAX_FAST };
+        self.start = Start::Ramp { from: self.code, to: 0, ticks: 0, over: relax::FAST };
         self.target = Nanometres(0);
     }
 
     fn ramp(&mut self) {
         let Start::Ramp { from, to, ticks, over } = &mut self.start else { return };
         *ticks += 1;
-        let (at, over) = (i64::from(*ticks), i64::from(*over));
-        // 3 t^2 - 2 t^3 of the remaining time; 44 bits.
-        let left = over - at;
-        let way = i64::from(*from) - i64::from(*to);
-        self.code =
-            (i64::from(*to) + way * left * left * (3 * over - 2 * left) / (over * over * over)) as u16; // between the two
-        if at >= over {
+        self.code = relax::code(*from, *to, *ticks, *over);
+        if *ticks >= *over {
             self.start = Start::Over;
         }
         self.command = self.scale.played(self.code);

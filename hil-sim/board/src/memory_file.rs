@@ -17,13 +17,18 @@ fn failed(what: &str, path: &Path) -> impl FnOnce(std::io::Error) -> SimError {
 
 /// Contents at the end of the last run; `None` without a file.
 pub fn read(path: &Path) -> Result<Option<Box<[u8; SIZE]>>, SimError> {
-    let bytes = match fs::read(path) {
+    let unlike = |length| SimError::Memory { path: path.into(), length, expected: SIZE };
+    match fs::metadata(path) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-        read => read.map_err(failed("read", path))?,
-    };
+        // A device, which may have no end, has the length 0.
+        Ok(found) if !found.is_dir() && found.len() != SIZE as u64 => {
+            return Err(unlike(usize::try_from(found.len()).unwrap_or(usize::MAX)));
+        }
+        _ => {}
+    }
+    let bytes = fs::read(path).map_err(failed("read", path))?;
     let length = bytes.len();
-    let contents = bytes.into_boxed_slice().try_into();
-    contents.map(Some).map_err(|_| SimError::Memory { path: path.into(), length, expected: SIZE })
+    bytes.into_boxed_slice().try_into().map(Some).map_err(|_| unlike(length))
 }
 
 fn aside(path: &Path) -> PathBuf {
@@ -45,8 +50,9 @@ pub struct Kept {
 
 impl Kept {
     pub fn read(path: &Path) -> Result<Self, SimError> {
+        let before = read(path)?;
         check_writable(path)?;
-        Ok(Self { path: path.into(), before: read(path)? })
+        Ok(Self { path: path.into(), before })
     }
 
     pub fn before(&self) -> Option<&[u8; SIZE]> {
@@ -98,5 +104,12 @@ mod tests {
         fs::write(&path, [1, 2, 3]).expect("writable");
         let refused = read(&path).expect_err("three bytes are refused").to_string();
         assert!(refused.contains("3 bytes") && refused.contains("32768"), "{refused}");
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn a_device_without_an_end_is_refused() {
+        let refused = Kept::read(Path::new("/dev/zero")).expect_err("it has no end").to_string();
+        assert!(refused.contains("/dev/zero") && refused.contains("32768"), "{refused}");
     }
 }

@@ -112,7 +112,7 @@ fn step(noise: &mut Noise) -> Step {
         }
         14 => (Deed::Stop, 0.0),
         15 => (Deed::Halt, 0.0),
-        16 => (one_of(noise, &[Waits::Pause, Waits::Resume]).deed(), 0.0),
+        16 => (if below(noise, 2) == 0 { Deed::Pause } else { Deed::Resume }, 0.0),
         17 => (Deed::Clear, 0.0),
         20..=22 => (Deed::Expose(program(noise)), 0.3),
         18 => (Deed::Wait { ms: rounded(over_orders(noise, 1.0, 500.0)) }, 0.0),
@@ -120,21 +120,6 @@ fn step(noise: &mut Noise) -> Step {
         _ => (Deed::Silent { ms: rounded(over_orders(noise, 10.0, 2_500.0)) }, 0.0),
     };
     Step { deed, goes_on_after_ms: goes_on(noise, patience) }
-}
-
-#[derive(Clone, Copy)]
-enum Waits {
-    Pause,
-    Resume,
-}
-
-impl Waits {
-    fn deed(self) -> Deed {
-        match self {
-            Self::Pause => Deed::Pause,
-            Self::Resume => Deed::Resume,
-        }
-    }
 }
 
 fn when(noise: &mut Noise, what: &Kind) -> When {

@@ -8,6 +8,7 @@ use farnear_protocol::{
     message::{Axis, Shot, TriggerMode},
 };
 
+pub use self::client::Counts;
 use self::client::{Client, Ended};
 use farnear_sim::{
     EmulatedRig, RigConfig, SimError,
@@ -28,12 +29,7 @@ pub struct Outcome {
     pub broken: Vec<Broken>,
     /// Virtual time of the run.
     pub board_ns: u64,
-    pub answered: u64,
-    /// Long work that ended with and without success.
-    pub done: u32,
-    pub failed: u32,
-    pub alarms: u32,
-    pub exposures: u32,
+    pub counts: Counts,
     pub resets: usize,
 }
 
@@ -57,16 +53,7 @@ pub fn play(scenario: &Scenario, config: &RigConfig) -> Result<Outcome, SimError
     broken.extend(works.map(|what| Broken { property: "works-after", at_ns: report.now_ns, what }));
     let counts = client.counts;
     client.rig.stop()?;
-    Ok(Outcome {
-        broken,
-        board_ns: report.now_ns,
-        answered: counts.answered,
-        done: counts.done,
-        failed: counts.failed,
-        alarms: counts.alarms,
-        exposures: counts.exposures,
-        resets: report.resets,
-    })
+    Ok(Outcome { broken, board_ns: report.now_ns, counts, resets: report.resets })
 }
 
 fn go(axis: Axis, to_um: f64) -> Request {

@@ -22,7 +22,7 @@ use std::{
 pub use self::{draw::draw, shrink::shrink};
 use farnear_sim::{RigConfig, Scenario, SimError};
 
-use host_model::{Outcome, play};
+use host_model::{Counts, Outcome, play};
 use invariants::Broken;
 
 /// Part `index` of `count` of the seeds.
@@ -80,14 +80,9 @@ impl Summary {
     fn add(&mut self, outcome: &Outcome) {
         self.played += 1;
         self.board_s += outcome.board_ns as f64 * 1e-9;
-        let seen = [
-            outcome.answered,
-            u64::from(outcome.done),
-            u64::from(outcome.failed),
-            u64::from(outcome.alarms),
-            u64::from(outcome.exposures),
-            outcome.resets as u64,
-        ];
+        let Counts { answered, done, failed, alarms, exposures } = outcome.counts;
+        let [done, failed, alarms, exposures] = [done, failed, alarms, exposures].map(u64::from);
+        let seen = [answered, done, failed, alarms, exposures, outcome.resets as u64];
         self.counts.iter_mut().zip(seen).for_each(|(sum, one)| *sum += one);
     }
 

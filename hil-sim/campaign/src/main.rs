@@ -140,11 +140,11 @@ fn play_file(file: &Path, firmware: Option<&Path>, trace: Option<PathBuf>) -> Re
         stdout,
         "{:.3} s of the board's time: {} requests answered, {} works done and {} failed, {} alarms, {} exposures, {} resets",
         outcome.board_ns as f64 * 1e-9,
-        outcome.answered,
-        outcome.done,
-        outcome.failed,
-        outcome.alarms,
-        outcome.exposures,
+        outcome.counts.answered,
+        outcome.counts.done,
+        outcome.counts.failed,
+        outcome.counts.alarms,
+        outcome.counts.exposures,
         outcome.resets
     )?;
     for broken in &outcome.broken {

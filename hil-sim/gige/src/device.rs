@@ -332,14 +332,7 @@ mod tests {
 
     impl Client {
         fn new() -> Self {
-            let config = GigeConfig {
-                address: Ipv4Addr::LOCALHOST,
-                seed: 7,
-                lost_per_thousand: 0,
-                sensor_px: (640, 480),
-                bits: 12,
-            };
-            let mut client = Self(Device::new(&config));
+            let mut client = Self(Device::new(&crate::registers::tests::config()));
             assert_eq!(client.write(PRIVILEGE, 2), Ok(vec![]));
             client
         }

@@ -221,10 +221,10 @@ impl Registers {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
-    pub fn config() -> GigeConfig {
+    pub(crate) fn config() -> GigeConfig {
         GigeConfig {
             address: Ipv4Addr::LOCALHOST,
             seed: 7,

@@ -6,7 +6,7 @@
 use thiserror::Error;
 
 use crate::optics::OpticsFile;
-pub use crate::thin_lens::image_distance_mm;
+pub use crate::optics::image_distance_mm;
 
 /// Lens with its two focus settings.
 #[derive(Debug, Clone, PartialEq)]
@@ -151,9 +151,7 @@ pub(crate) mod tests {
 
     /// The rig of Li 2014, ch. 4.
     pub(crate) fn thesis_lens() -> Lens {
-        let text = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n\
-                    [focus]\nfar_mm = 933.0\nmax_blur_px = 2.703";
-        Lens::from_optics(&OpticsFile::parse(text).unwrap()).unwrap()
+        Lens::from_optics(&OpticsFile::parse(crate::standard::OPTICS).unwrap()).unwrap()
     }
 
     #[test]

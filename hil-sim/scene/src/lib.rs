@@ -32,7 +32,6 @@ mod scene_file;
 mod scene_text;
 pub mod standard;
 pub mod texture;
-mod thin_lens;
 pub mod view;
 pub mod wave;
 

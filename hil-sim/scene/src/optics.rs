@@ -6,7 +6,6 @@ use serde::Deserialize;
 use thiserror::Error;
 
 use crate::psf::{Psf, PsfError};
-use crate::thin_lens::image_distance_mm;
 
 /// Tolerated relative disagreement of dependent values.
 const AGREEMENT: f64 = 0.02;
@@ -90,6 +89,12 @@ impl OpticsFile {
         let telecentric = raw.lens.telecentric;
         Ok(Self { focal_length_mm, aperture_mm, pixel_um, far_mm, near_mm, max_blur_px, psf, telecentric })
     }
+}
+
+/// Image distance of an object at `object_mm`, mm: `1/F = 1/u + 1/w`.
+#[must_use]
+pub fn image_distance_mm(focal_length_mm: f64, object_mm: f64) -> f64 {
+    1.0 / (1.0 / focal_length_mm - 1.0 / object_mm)
 }
 
 struct Travel {

@@ -26,6 +26,8 @@ const QUIET_AT_MOST: Duration = Duration::from_millis(500);
 const SEND_AT_LEAST: Duration = Duration::from_millis(20);
 /// Longest read between two looks at the interruption.
 const SLICE: Duration = Duration::from_millis(25);
+/// Longest wait for answers after an interruption. An emulated board, whose timeouts are longer, may be frozen.
+const INTERRUPTED: Duration = Duration::from_secs(2);
 
 /// Drops input until the line is silent, or the timeout.
 fn until_quiet(transport: &mut dyn Transport, buffer: &mut [u8]) -> io::Result<()> {
@@ -59,6 +61,12 @@ pub(crate) struct Link {
     bytes: u64,
     bad_frames: u64,
     interrupt: Option<Arc<AtomicBool>>,
+    /// When it was first seen.
+    interrupted_at: Option<Instant>,
+    /// An interruption shortens waits and does not end them.
+    open: bool,
+    /// When the present or last request was sent first.
+    asked: Instant,
 }
 
 impl Link {
@@ -75,12 +83,32 @@ impl Link {
             bytes: 0,
             bad_frames: 0,
             interrupt: None,
+            interrupted_at: None,
+            open: false,
+            asked: Instant::now(),
         }
     }
 
-    /// Once this flag is set, reads return [`ClientError::Interrupted`].
+    /// Once this flag is set, reads return [`ClientError::Interrupted`]; after [`Link::opened`] answers are awaited for
+    /// at most [`INTERRUPTED`].
     pub(crate) fn interrupt_by(&mut self, flag: Option<Arc<AtomicBool>>) {
         self.interrupt = flag;
+        self.interrupted_at = None;
+    }
+
+    /// From now on an interruption stops the rig over this link.
+    pub(crate) fn opened(&mut self) {
+        self.open = true;
+    }
+
+    pub(crate) fn interrupted(&self) -> bool {
+        self.interrupt.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed))
+    }
+
+    /// End of the waits after an interruption.
+    fn last_wait(&mut self) -> Option<Instant> {
+        let at = if self.interrupted() { Instant::now() } else { return None };
+        Some(self.asked.max(*self.interrupted_at.get_or_insert(at)) + INTERRUPTED)
     }
 
     /// Starts a session; ids follow the last one seen by the board.
@@ -188,9 +216,14 @@ impl Link {
         if asked.is_empty() {
             return Ok(Vec::new());
         }
-        let begin = Instant::now();
+        self.asked = Instant::now();
         let (bytes_before, bad_frames) = (self.bytes, self.bad_frames);
+        let mut attempts = 0;
         for (attempt, wait) in waits.iter().enumerate() {
+            if attempt > 0 && self.last_wait().is_some_and(|until| Instant::now() >= until) {
+                break;
+            }
+            attempts += 1;
             // Before the last attempt: another program may have changed the port's settings.
             if attempt > 0 && attempt + 1 == waits.len() {
                 self.renew(during)?;
@@ -222,8 +255,8 @@ impl Link {
         Err(ClientError::Silent {
             port: self.port.clone(),
             during: during.into(),
-            attempts: waits.len() as u32,
-            waited: begin.elapsed(),
+            attempts,
+            waited: self.asked.elapsed(),
             bad_frames: self.bad_frames - bad_frames,
             bytes: self.bytes - bytes_before,
         })
@@ -240,18 +273,17 @@ impl Link {
                     None => {}
                 }
             }
+            let last = self.last_wait();
+            if last.is_some() && !self.open {
+                return Err(ClientError::Interrupted { during: during.into(), stopped: false });
+            }
+            let until = last.map_or(until, |last| until.min(last));
             let left = until.saturating_duration_since(Instant::now());
             if left.is_zero() && looked {
                 return Ok(None);
             }
             looked = true;
-            let slice = match &self.interrupt {
-                Some(flag) if flag.load(Ordering::Relaxed) => {
-                    return Err(ClientError::Interrupted { during: during.into(), stopped: false });
-                }
-                Some(_) => left.min(SLICE),
-                None => left,
-            };
+            let slice = if self.interrupt.is_some() { left.min(SLICE) } else { left };
             let received = match &mut self.transport {
                 Some(transport) => transport.receive(&mut self.buffer, slice),
                 None => Err(ErrorKind::NotConnected.into()),
@@ -292,5 +324,46 @@ impl Link {
 
     fn gone(&self, source: io::Error, during: &str) -> ClientError {
         ClientError::Gone { port: self.port.clone(), during: during.into(), source: Arc::new(source) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use farnear_protocol::PROTOCOL_CURRENT;
+
+    use super::*;
+
+    struct Silent;
+
+    impl Transport for Silent {
+        fn receive(&mut self, _: &mut [u8], wait: Duration) -> io::Result<usize> {
+            std::thread::sleep(wait);
+            Ok(0)
+        }
+
+        fn send(&mut self, _: &[u8], _: Duration) -> io::Result<()> {
+            Ok(())
+        }
+
+        fn discard_input(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn an_interruption_shortens_the_wait_for_an_answer() {
+        let flag = Arc::new(AtomicBool::new(false));
+        let mut link = Link::new(Box::new(Silent), "port");
+        link.interrupt_by(Some(Arc::clone(&flag)));
+        link.opened();
+        let setter = std::thread::spawn(move || {
+            std::thread::sleep(Duration::from_millis(100));
+            flag.store(true, Ordering::Relaxed);
+        });
+        let waits = [Duration::from_secs(30); 3];
+        let asked = link.ask((PROTOCOL_CURRENT, 0), &Request::Stop, &waits, "stopping", &mut |_| Ok(()));
+        let Err(ClientError::Silent { attempts, waited, .. }) = asked else { panic!("{asked:?}") };
+        assert!(attempts == 1 && waited < Duration::from_secs(20), "{attempts} in {waited:?}");
+        setter.join().unwrap();
     }
 }

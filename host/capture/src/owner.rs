@@ -161,7 +161,7 @@ impl Owner {
             unanswered: 0,
         };
         owner.join_events()?;
-        owner.link.interrupt_by(None); // from now on an interruption stops the rig over this link
+        owner.link.opened();
         Ok(owner)
     }
 
@@ -220,7 +220,7 @@ impl Owner {
             Ok(answered) => answered,
             Err(error) => {
                 let starts = questions.iter().any(|question| question.listener.is_some());
-                if starts && matches!(error, ClientError::Silent { .. }) {
+                if starts && self.broken.is_none() && matches!(error, ClientError::Silent { .. }) {
                     // The board may have begun it.
                     let _ = self.ask(&Request::Stop, "stopping");
                 }

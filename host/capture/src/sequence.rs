@@ -181,9 +181,10 @@ pub struct SequenceShot {
 /// File name of an image of the shot with this index; the names of all `shots` sort in their order.
 pub fn image_name(index: usize, shots: usize, record: &ShotRecord, repeats: u16) -> String {
     let digits = shots.saturating_sub(1).to_string().len().max(2);
+    let places = repeats.saturating_sub(1).to_string().len().max(3);
     match repeats {
         0..=1 => format!("shot-{index:0digits$}.png"),
-        _ => format!("shot-{index:0digits$}-{:03}.png", record.repeat),
+        _ => format!("shot-{index:0digits$}-{:0places$}.png", record.repeat),
     }
 }
 
@@ -238,7 +239,8 @@ mod tests {
             |shots: usize| (0..shots).map(|index| image_name(index, shots, &record, 1)).collect::<Vec<_>>();
         assert_eq!((&*names(64)[7], &*names(101)[7]), ("shot-07.png", "shot-007.png"));
         assert!([64, 100, 101].into_iter().all(|shots| names(shots).is_sorted()));
-        assert_eq!(image_name(7, 8, &record, 2), "shot-07-000.png");
+        assert_eq!(image_name(7, 8, &record, 1000), "shot-07-000.png");
+        assert_eq!(image_name(7, 8, &record, 1001), "shot-07-0000.png");
     }
 
     #[test]

@@ -10,8 +10,9 @@ use farnear_depth::baselines::{self, Favaro, FavaroSettings};
 use farnear_depth::calibrate::{CapturedPair, Model, fit_psf};
 use farnear_depth::corrections::{CdcSettings, Method, Pattern, fit};
 use farnear_depth::focus_measure::FocusMeasure;
-use farnear_depth::optics::{FocusSection, LensSection, Optics, OpticsFile, SensorSection};
+use farnear_depth::optics::{Optics, OpticsFile};
 use farnear_depth::pipeline::Settings;
+use farnear_scene::standard;
 use ndarray::Array2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -19,22 +20,9 @@ use rand_chacha::ChaCha8Rng;
 const DIM: (usize, usize) = (480, 640);
 
 fn optics() -> Optics {
-    OpticsFile {
-        lens: LensSection {
-            focal_length_mm: 50.0,
-            aperture_mm: Some(12.8),
-            f_number: None,
-            telecentric: None,
-        },
-        sensor: SensorSection { pixel_um: 7.4 },
-        focus: FocusSection { far_mm: 933.0, max_blur_px: Some(2.703), near_mm: None },
-        psf: "gaussian:k=0.4578".parse().unwrap(),
-        distortion: None,
-        stage: None,
-        light: None,
-    }
-    .check()
-    .unwrap()
+    let mut file: OpticsFile = toml::from_str(standard::OPTICS).unwrap();
+    file.psf = "gaussian:k=0.4578".parse().unwrap();
+    file.check().unwrap()
 }
 
 fn random(low: f32, high: f32, seed: u64) -> Array2<f32> {
@@ -76,6 +64,7 @@ impl Report {
 }
 
 fn main() {
+    rayon::ThreadPoolBuilder::new().num_threads(1).build_global().unwrap();
     let filter = std::env::args().skip(1).find(|argument| !argument.starts_with("--"));
     let report = Report { filter };
     let depths: Vec<f64> = (0..24).map(|i| 933.0 - 2.0 * f64::from(i)).collect();

@@ -6,8 +6,9 @@
 use std::hint::black_box;
 
 use farnear_depth::operators::Operators;
-use farnear_depth::optics::{FocusSection, LensSection, OpticsFile, SensorSection};
+use farnear_depth::optics::OpticsFile;
 use farnear_depth::pipeline::{Backend, Processor, Settings};
+use farnear_scene::standard;
 use ndarray::Array2;
 
 /// Small, because the emulator logs every instruction. Borders count too: a large pair takes less per pixel.
@@ -20,22 +21,9 @@ fn main() {
         return;
     };
     let backend = *Backend::available().iter().find(|b| format!("{b:?}").to_lowercase() == *unit).unwrap();
-    let optics = OpticsFile {
-        lens: LensSection {
-            focal_length_mm: 50.0,
-            aperture_mm: Some(12.8),
-            f_number: None,
-            telecentric: None,
-        },
-        sensor: SensorSection { pixel_um: 7.4 },
-        focus: FocusSection { far_mm: 933.0, max_blur_px: Some(2.703), near_mm: None },
-        psf: "pillbox".parse().unwrap(),
-        distortion: None,
-        stage: None,
-        light: None,
-    }
-    .check()
-    .unwrap();
+    let mut file: OpticsFile = toml::from_str(standard::OPTICS).unwrap();
+    file.psf = "pillbox".parse().unwrap();
+    let optics = file.check().unwrap();
     let operators: Operators = toml::from_str(include_str!("one_chain_operators.toml")).unwrap();
     let pair = [3, 5].map(|seed| {
         Array2::from_shape_fn(SIZE, |(y, x)| ((y * 7 * seed + x * 13 + x * y * seed) % 31) as f32)

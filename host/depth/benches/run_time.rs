@@ -13,7 +13,7 @@ use farnear_depth::filter::convolve;
 use farnear_depth::kernel::Kernel;
 use farnear_depth::measure::{DepthMethod, MeasureSettings, measure_pair};
 use farnear_depth::operators::{Design, Family, Operators, Request, design};
-use farnear_depth::optics::{FocusSection, LensSection, Optics, OpticsFile, SensorSection};
+use farnear_depth::optics::{Optics, OpticsFile};
 use farnear_depth::pipeline::{Backend, Processor, Settings};
 use farnear_depth::prepare::{Align, Balance, PrepareSettings, prepare};
 use farnear_depth::stream::Stream;
@@ -23,22 +23,9 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 fn optics(psf: &str) -> Optics {
-    OpticsFile {
-        lens: LensSection {
-            focal_length_mm: 50.0,
-            aperture_mm: Some(12.8),
-            f_number: None,
-            telecentric: None,
-        },
-        sensor: SensorSection { pixel_um: 7.4 },
-        focus: FocusSection { far_mm: 933.0, max_blur_px: Some(2.703), near_mm: None },
-        psf: psf.parse().unwrap(),
-        distortion: None,
-        stage: None,
-        light: None,
-    }
-    .check()
-    .unwrap()
+    let mut file: OpticsFile = toml::from_str(standard::OPTICS).unwrap();
+    file.psf = psf.parse().unwrap();
+    file.check().unwrap()
 }
 
 fn random_image(height: usize, width: usize, seed: u64) -> Array2<f32> {
@@ -125,7 +112,7 @@ fn real_pair(optics: &Optics, [prepare_name, adaptive_name]: [&str; 2], size: (u
         ..PrepareSettings::default()
     };
     let threads = rayon::current_num_threads();
-    let run = || prepare(far.view(), near.view(), optics, None, &settings).unwrap();
+    let run = || prepare([far.clone(), near.clone()], optics, None, &settings).unwrap();
     report(prepare_name, None, threads, time(runs, run), None);
     let pair = run();
     let bank = Bank::whitened(optics).unwrap();

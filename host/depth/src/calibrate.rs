@@ -1,4 +1,4 @@
-//! Calibration on captured images: PSF parameters, and series of flat targets for corrections.
+//! Calibration on captured images.
 //!
 //! ## PSF (Li 2014, sections 5.2.1 and 5.2.2)
 //! A flat, textured target is at the far focus: the far-focused image is sharp and the near-focused one blurred by the
@@ -20,13 +20,10 @@ pub mod stack;
 use std::fmt;
 use std::str::FromStr;
 
-use ndarray::{Array2, ArrayView2};
+use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 
-use crate::corrections::Pattern;
-use crate::operators::Operators;
 use crate::optics::Optics;
-use crate::pipeline::{RunError, Settings, depth_from_pair};
 use crate::psf::Psf;
 
 pub use free::OtfPoint;
@@ -123,8 +120,6 @@ pub enum CalibrationError {
     AtSearchEnd { parameter: &'static str, value: f64 },
     #[error("no round point spread function makes one image of the other: {0}")]
     Profile(String),
-    #[error("flat target {} at {true_mm} mm: {reason}", .index + 1)]
-    FlatTarget { index: usize, true_mm: f64, reason: RunError },
 }
 
 /// A pair of images of a flat target.
@@ -279,57 +274,6 @@ pub fn fit_psf(
         otf,
         alphas,
     })
-}
-
-/// A pair of a flat target at a known depth.
-#[derive(Debug, Clone, Copy)]
-pub struct FlatTarget<'a> {
-    /// Far-focused image, (height, width).
-    pub far: ArrayView2<'a, f32>,
-    /// Near-focused image.
-    pub near: ArrayView2<'a, f32>,
-    /// Depth of the target, mm.
-    pub true_mm: f64,
-}
-
-/// The measured depth map of a flat target.
-#[derive(Debug, Clone)]
-pub struct MeasuredPattern {
-    /// Depth, mm, (height, width); NaN where the confidence is below the limit.
-    pub depth_mm: Array2<f32>,
-    /// Depth of the target, mm.
-    pub true_mm: f64,
-}
-
-impl MeasuredPattern {
-    /// As input of [`crate::corrections::fit`].
-    pub fn as_pattern(&self) -> Pattern<'_> {
-        Pattern { depth_mm: self.depth_mm.view(), true_mm: self.true_mm }
-    }
-}
-
-/// Patterns of flat targets; 20 to 30 through the working range suffice. Excludes pixels below `least_confidence`.
-/// Returns [`CalibrationError::FlatTarget`] for a target without a depth map.
-pub fn measure_patterns(
-    targets: &[FlatTarget<'_>],
-    operators: &Operators,
-    optics: &Optics,
-    settings: &Settings,
-    least_confidence: f32,
-) -> Result<Vec<MeasuredPattern>, CalibrationError> {
-    let measure = |(index, target): (usize, &FlatTarget<'_>)| {
-        let true_mm = target.true_mm;
-        let map = depth_from_pair(target.far, target.near, operators, optics, settings)
-            .map_err(|reason| CalibrationError::FlatTarget { index, true_mm, reason })?;
-        let mut depth_mm = map.depth_mm;
-        ndarray::Zip::from(&mut depth_mm).and(&map.confidence).for_each(|depth, confidence| {
-            if *confidence < least_confidence {
-                *depth = f32::NAN;
-            }
-        });
-        Ok(MeasuredPattern { depth_mm, true_mm })
-    };
-    targets.iter().enumerate().map(measure).collect()
 }
 
 #[cfg(test)]

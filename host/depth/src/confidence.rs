@@ -19,7 +19,9 @@ const SAMPLE: usize = 10_000;
 
 pub(crate) fn sample((height, width): (usize, usize)) -> SliceInfo<[SliceInfoElem; 2], Ix2, Ix2> {
     let step = (((height * width) as f64 / SAMPLE as f64).sqrt() as usize).max(1);
-    s![step / 2..;step, step / 2..;step]
+    // A long image may be narrower than the step.
+    let [y, x] = [height, width].map(|side| step.min(side.max(1)));
+    s![y / 2..;y, x / 2..;x]
 }
 
 /// Median energy of the pixels with texture, the unit of texture energy; 0 without any.
@@ -70,6 +72,7 @@ mod tests {
             // The step is rounded down.
             assert_eq!(map.slice(sample(size)).dim(), side);
         }
+        assert_eq!(Array2::<f32>::zeros((1, 200_000)).slice(sample((1, 200_000))).dim(), (1, 50_000));
     }
 
     #[test]

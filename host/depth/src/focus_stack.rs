@@ -23,7 +23,7 @@ use std::ops::Range;
 use ndarray::{Array2, ArrayView2, ArrayViewMut1, Axis, Zip, s};
 use rayon::prelude::*;
 
-use crate::{metrics::dilate_square, prepare::band::box_mean};
+use crate::{median::medians, metrics::dilate_square, prepare::band::box_mean};
 pub use error::StackError;
 use guided::{Guide, mended};
 pub use sharpness::{Sharpness, UnknownSharpness};
@@ -151,7 +151,7 @@ pub fn depth_from_positions<S: Slices + ?Sized>(
     }
     let band = (BAND_BYTES / (4 * images.dim(0).1 * count)).max(LEAST_BAND);
     let Curves { place, reliability, sharpness, rise } = curves(images, positions, settings, band)?;
-    let mut place = median(place, settings.median_px);
+    let mut place = medians(place, settings.median_px);
     let mut all_in_focus = sharp_everywhere(images, &place, band)?;
     if settings.guided_px > 0.0 {
         let guide = Guide {
@@ -217,27 +217,6 @@ fn curves<S: Slices + ?Sized>(
         images.measured(rows.end, height)?;
     }
     Ok(Curves { place, reliability, sharpness, rise })
-}
-
-/// Median over a window of `side` pixels, smaller at the borders.
-fn median(map: Array2<f32>, side: usize) -> Array2<f32> {
-    if side == 1 {
-        return map;
-    }
-    let (reach, (height, width)) = (side / 2, map.dim());
-    let mut result = Array2::zeros((height, width));
-    result.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(y, mut row)| {
-        let mut window = Vec::with_capacity(side * side);
-        for (x, value) in row.iter_mut().enumerate() {
-            let rows = y.saturating_sub(reach)..(y + reach + 1).min(height);
-            let columns = x.saturating_sub(reach)..(x + reach + 1).min(width);
-            window.clear();
-            window.extend(map.slice(s![rows, columns]).iter().copied());
-            let middle = window.len() / 2;
-            *value = *window.select_nth_unstable_by(middle, f32::total_cmp).1;
-        }
-    });
-    result
 }
 
 fn check<S: Slices + ?Sized>(images: &S, settings: &StackSettings) -> Result<(), StackError> {

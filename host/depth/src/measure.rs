@@ -3,6 +3,8 @@
 mod finding;
 mod scaled_blur;
 
+use std::ops::RangeInclusive;
+
 use ndarray::{Array2, ArrayView2, Zip, s};
 
 use crate::adaptive_window::{
@@ -19,6 +21,7 @@ use crate::optics::{Optics, Stage};
 use crate::pipeline::{RunError, Settings, depth_from_pair, extend_border, fill_border, warnings_after};
 use crate::prepare::{
     CameraFrames, PrepareError, PrepareSettings, Prepared, Registration, Report, prepare_after,
+    usual_magnitude,
 };
 use crate::psf::Psf;
 use crate::reason::Reason;
@@ -36,6 +39,8 @@ const LEAST_NOISE: f64 = 0.1;
 const OTHER_TEXTURE: f64 = 0.3;
 /// Rows in the middle of a learned lens's images whose residual is compared with the noise first.
 const SAMPLED_ROWS: usize = 96;
+/// Magnitudes whose squares, and small parts of them, f32 holds.
+const USUAL_MAGNITUDES: RangeInclusive<f32> = 1e-9..=1e9;
 /// Part of the pixels lost for one reason above which it is reported.
 pub const LEAST_REPORTED: f64 = 0.01;
 /// Part of the noise by lossy compression that is worth a word: JPEG of quality 95 has 0.3, 90 has 0.4.
@@ -131,15 +136,11 @@ pub struct Measurement {
     pub report: Report,
     /// What a user should know.
     pub findings: Vec<Finding>,
-    /// Unexplained texture beyond the noise, mean squares ([`Estimate::left_over`]).
-    pub left_over: f64,
-    /// The same relative to the noise ([`Estimate::excess`]).
-    pub excess: f64,
     /// The pair as it was measured.
     pub prepared: Prepared,
 }
 
-/// Depth of a pair in any common scale, with [`prepare`](crate::prepare) and [`judge`](crate::validity).
+/// Depth of a pair in any common scale, with [`prepare`](crate::prepare) and [`assess`](crate::validity).
 pub fn measure_pair_of_views(
     far: ArrayView2<f32>,
     near: ArrayView2<f32>,
@@ -165,7 +166,22 @@ pub fn measure_pair(
     if is_same(far.view(), near.view()) {
         return Err(RunError::SameImage.into());
     }
+    let mut images = images;
+    // Known noise has the unit of the images, a camera's frames and limits are of values up to 1.
+    if settings.prepare.noise.is_none() && settings.prepare.limits.is_none() && camera.is_none() {
+        scale_to_usual(&mut images);
+    }
     measure_after(&mut None, &Bank::whitened(optics)?, images, optics, method, camera, settings)
+}
+
+/// Scales a pair whose squares are beyond f32, by a power of two, which rounds nothing.
+fn scale_to_usual(images: &mut [Array2<f32>; 2]) {
+    let usual = images.iter().filter_map(|image| usual_magnitude(image.view())).fold(0.0, f32::max);
+    if usual > 0.0 && !USUAL_MAGNITUDES.contains(&usual) {
+        // The limit keeps the factor a normal number.
+        let factor = 2.0_f32.powf(-usual.log2().round().clamp(-120.0, 120.0));
+        images.iter_mut().for_each(|image| image.par_mapv_inplace(|value| value * factor));
+    }
 }
 
 /// Whether all pixels are alike; NaN (transparent) is alike NaN.
@@ -209,7 +225,6 @@ pub(crate) fn measure_after(
     let (mut map, estimate) = measure(&prepared, white, optics, method, settings)?;
     let mut findings = findings(&map, &prepared, &estimate, optics);
     findings.extend(is_mosaic.then_some(Finding::Mosaic));
-    let (left_over, excess) = (estimate.left_over, estimate.excess);
     let judging = ValiditySettings { least_confidence: settings.least_confidence, filled: settings.run.fill };
     let validity = assess(&mut map, &prepared, estimate, optics, &judging);
     // The loss that the caller asked for is news only if nothing is left.
@@ -227,7 +242,7 @@ pub(crate) fn measure_after(
     }
     map.warnings.clear();
     let report = prepared.report;
-    Ok(Measurement { map, validity, report, findings, left_over, excess, prepared })
+    Ok(Measurement { map, validity, report, findings, prepared })
 }
 
 /// The white residual judges every method, because its deviation is known best.

@@ -1,9 +1,11 @@
 //! Errors of a depth map against the truth. Pixels count if they lie `border_px` inside the map, the mask allows them,
 //! both depths are finite and, if requested, they lie more than `away_from_edges_px` from a step of the true depth.
-//! Depths in mm, NaN = no value. Cost: O(pixels); O(pixels x distance) with `away_from_edges_px` .
+//! Depths in mm, NaN = no value. Cost: O(pixels); O(pixels x distance) with `away_from_edges_px`.
 
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
+
+use crate::median::median;
 
 /// Difference of neighbouring true depths that is a step, as part of the truth's range.
 const STEP: f32 = 0.02;
@@ -50,7 +52,7 @@ pub struct Comparison {
     pub pixels_without_truth: usize,
 }
 
-/// Compares `depth` with `truth`in mm, where `mask` is true. [`CompareError`] if sizes differ or no pixel is left.
+/// Compares `depth` with `truth` in mm, where `mask` is true. [`CompareError`] if sizes differ or no pixel is left.
 pub fn compare(
     depth: ArrayView2<f32>,
     truth: ArrayView2<f32>,
@@ -139,14 +141,12 @@ pub fn near_steps(truth: ArrayView2<f32>, distance: usize) -> Array2<bool> {
         [(y, x + 1), (y + 1, x)].into_iter().filter(move |(y, x)| *y < height && *x < width)
     };
     let difference = |a: (usize, usize), b: (usize, usize)| (truth[a] - truth[b]).abs();
-    let mut slopes: Vec<f32> = truth
+    let slopes = truth
         .indexed_iter()
         .flat_map(|(at, _)| neighbours(at).map(move |next| difference(at, next)))
         .filter(|d| d.is_finite())
         .collect();
-    let middle = slopes.len() / 2;
-    let usual =
-        if slopes.is_empty() { 0.0 } else { *slopes.select_nth_unstable_by(middle, f32::total_cmp).1 };
+    let usual = median(slopes, f32::total_cmp).unwrap_or(0.0);
     let threshold = (STEP * range).max(4.0 * usual);
     let mut steps = Array2::from_elem((height, width), false);
     for (at, _) in truth.indexed_iter() {

@@ -3,7 +3,7 @@
 //! `NIR(w, alpha) = (H2 - H1) / (H2 + H1)` with `H1` the far-focused OTF (sign of Li 2014, eq. 1.7: `M = I2 - I1`; 1.5
 //! and 5.2 print the other one). It rises with alpha and is odd in it. Each frequency is fitted by
 //! `a1(w) alpha + a3(w) alpha^3` over alpha in [-1, 1]. Frequencies in rad/px. The grid is the 32x32 DFT, reduced to
-//! the octant `0 <= v <= u <= 16` with multiplicities (153 points)and 21 depths. Cost: 153 x 21 OTF pairs, about 1 ms.
+//! the octant `0 <= v <= u <= 16` with multiplicities (153 points) and 21 depths. Cost: 153 x 21 OTF pairs, about 1 ms.
 
 use std::f64::consts::PI;
 

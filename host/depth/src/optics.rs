@@ -217,7 +217,7 @@ mod tests {
     use super::*;
 
     /// Li 2014's rig (section 5.3); distances calculated by hand from the thin lens.
-    const RIG: &str = "
+    pub(super) const RIG: &str = "
         [lens]
         focal_length_mm = 50.0
         aperture_mm = 12.8
@@ -232,7 +232,7 @@ mod tests {
         k = 0.4802
     ";
 
-    fn rig() -> OpticsFile {
+    pub(super) fn rig() -> OpticsFile {
         toml::from_str(RIG).unwrap()
     }
 

@@ -170,6 +170,7 @@ mod tests {
             (130, 40, 11, 9, 5),
             (64, 70, 9, 1, 7),
             (48, 90, 13, 7, 3),
+            (64, 70, 7, MAX_SMOOTHING_PX, 3),
         ] {
             let request = Request { kernel_size, ..Request::for_optics(&optics) };
             let operators = design(&request).unwrap();

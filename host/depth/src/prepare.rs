@@ -27,7 +27,7 @@ pub mod warp;
 use std::fmt;
 use std::str::FromStr;
 
-use ndarray::{Array2, ArrayView2, Axis};
+use ndarray::{Array2, Axis};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -41,10 +41,12 @@ use registration::{LEAST_DISPLACEMENT_PX, model};
 use thinned::Thinned;
 use warp::Warp;
 
+pub(crate) use defects::usual_magnitude;
 pub(crate) use registration::Registration;
 
 pub use camera::{CameraError, CameraFrames, check_saturation};
 pub use mismatch::Mismatch;
+pub use straight::straightened;
 
 /// A displacement below this many standard errors counts as none.
 const SIGNIFICANT: f64 = 5.0;
@@ -235,27 +237,12 @@ pub struct Prepared {
     pub report: Report,
 }
 
-/// Makes a pair ready for depth: `far` and `near`, (height, width), of any common scale.
+/// Makes the images `[far, near]`, (height, width), of any common scale, ready for depth. Nothing is copied that need not be,
+/// which counts where a map is as large as a machine's memory allows.
 ///
 /// # Errors
 /// [`PrepareError`] for images of different size, of different scenes, and for frames of another camera.
 pub fn prepare(
-    far: ArrayView2<f32>,
-    near: ArrayView2<f32>,
-    optics: &Optics,
-    camera: Option<&CameraFrames>,
-    settings: &PrepareSettings,
-) -> Result<Prepared, PrepareError> {
-    check_sizes(far.dim(), near.dim())?;
-    prepare_owned([far, near].map(|image| image.as_standard_layout().into_owned()), optics, camera, settings)
-}
-
-/// As [`prepare`], of the images `[far, near]` themselves: nothing is copied that need not be, which counts where a map is as
-/// large as a machine's memory allows.
-///
-/// # Errors
-/// As [`prepare`].
-pub fn prepare_owned(
     images: [Array2<f32>; 2],
     optics: &Optics,
     camera: Option<&CameraFrames>,
@@ -264,7 +251,7 @@ pub fn prepare_owned(
     prepare_after(&mut None, images, optics, camera, settings)
 }
 
-/// [`prepare_owned`] of the next pair of a rig. Reuses the registration of the `last` pair if it fits, else registers again.
+/// [`prepare`] of the next pair of a rig. Reuses the registration of the `last` pair if it fits, else registers again.
 pub(crate) fn prepare_after(
     last: &mut Option<Registration>,
     [mut far, mut near]: [Array2<f32>; 2],
@@ -297,18 +284,12 @@ pub(crate) fn prepare_after(
     let marks = marks.map(|marks| Some(straight::reasons(marks.as_ref(), size, &distortion)));
     let shows = |image: &Array2<f32>| image.iter().any(|value| value.is_finite());
     let had_shown = shows(&far) && shows(&near);
-    let pair = [far, near].map(|image| straight::image(image.view(), &distortion));
+    let pair = [far, near].map(|image| straightened(image.view(), &distortion));
     if had_shown && !pair.iter().all(shows) {
         let ([cx, cy], (height, width)) = (distortion.centre_px(), size);
         return Err(OpticsError::NothingStraight { cx, cy, width, height }.into());
     }
     finish(last, pair, Some(recorded), marks, optics, &PrepareSettings { noise, ..*settings })
-}
-
-/// An image as a lens without distortion would have taken it; NaN where the lens recorded nothing. Cost: 36
-/// multiply-adds and the map, some 30 operations, per pixel; on all threads.
-pub fn straightened(image: ArrayView2<f32>, distortion: &Distortion) -> Array2<f32> {
-    straight::image(image, distortion)
 }
 
 /// The near image as the lens recorded it: aligning it interpolates it once, not twice.

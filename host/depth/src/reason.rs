@@ -19,7 +19,7 @@ pub enum Reason {
     Edge = 5,
     /// Moved between the exposures.
     Moved = 6,
-    /// A bad pixel of the camera.
+    /// A bad pixel of the camera, or a wild value in a file of floats.
     BadPixel = 7,
     /// The model does not explain the pair here.
     Misfit = 8,

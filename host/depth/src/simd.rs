@@ -131,7 +131,7 @@ struct Line([f32; 16]);
 
 impl Plane {
     /// Readable and writable numbers beyond the requested width of each row.
-    pub const PADDING: usize = 80;
+    pub const PADDING: usize = 96;
 
     pub fn new(rows: usize, width: usize) -> Self {
         let stride = (width + Self::PADDING).next_multiple_of(16);

@@ -106,10 +106,11 @@ pub fn grid(columns: usize, plots: &[Plot]) -> Result<Vec<u8>> {
     })
 }
 
-type Area<'a> = DrawingArea<BitMapBackend<'a>, plotters::coord::Shift>;
-type Drawn = Result<(), Box<dyn std::error::Error>>;
+pub type Area<'a> = DrawingArea<BitMapBackend<'a>, plotters::coord::Shift>;
+pub type Drawn = Result<(), Box<dyn std::error::Error>>;
 
-fn draw_to_png(size: (u32, u32), title: &str, draw: impl FnOnce(&Area<'_>) -> Drawn) -> Result<Vec<u8>> {
+/// A white picture with what `draw` adds, as a PNG.
+pub fn draw_to_png(size: (u32, u32), title: &str, draw: impl FnOnce(&Area<'_>) -> Drawn) -> Result<Vec<u8>> {
     let mut buffer = vec![255_u8; 3 * (size.0 * size.1) as usize];
     let area = BitMapBackend::with_buffer(&mut buffer, size).into_drawing_area();
     let drawn = area.fill(&WHITE).map_err(Into::into).and_then(|()| draw(&area));

@@ -21,6 +21,7 @@ use anyhow::{Context, Result, bail};
 use clap::Parser;
 
 use page::Page;
+use people::data::Data;
 
 /// Measure the accuracy and write the accuracy pages.
 #[derive(Parser)]
@@ -40,9 +41,6 @@ struct Arguments {
     page: Vec<String>,
 }
 
-/// Names of `--page`; `real` is the page of the part `real`.
-const PAGES: [&str; 5] = ["accuracy", "robustness", "activity", "thesis", "real"];
-
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(()) => ExitCode::SUCCESS,
@@ -53,97 +51,99 @@ fn main() -> ExitCode {
     }
 }
 
+type Measure<'a> = Box<dyn Fn(&mut Page) -> Result<()> + 'a>;
+type OfData = fn(&mut Page, &Data) -> Result<()>;
+
+struct Plan<'a> {
+    /// Name of `--page`.
+    name: &'static str,
+    file: &'static str,
+    introduction: &'static str,
+    /// Names of `--only`, and what measures them.
+    parts: Vec<(&'static str, Measure<'a>)>,
+}
+
+/// All pages in their order.
+fn plans(data: &Data) -> [Plan<'_>; 5] {
+    let alone = |(name, measure): (&'static str, fn(&mut Page) -> Result<()>)| {
+        let measure: Measure<'_> = Box::new(measure);
+        (name, measure)
+    };
+    let with_data = |(name, measure): (&'static str, OfData)| {
+        let measure: Measure<'_> = Box::new(move |page: &mut Page| measure(page, data));
+        (name, measure)
+    };
+    [
+        Plan {
+            name: "accuracy",
+            file: "accuracy.md",
+            introduction: depth::INTRODUCTION,
+            parts: depth::RENDERED.map(alone).into(),
+        },
+        Plan {
+            name: "robustness",
+            file: "robustness.md",
+            introduction: robust::INTRODUCTION,
+            parts: robust::PARTS.map(alone).into(),
+        },
+        Plan {
+            name: "activity",
+            file: "activity.md",
+            introduction: people::INTRODUCTION,
+            parts: people::PARTS.map(with_data).into(),
+        },
+        Plan {
+            name: "thesis",
+            file: "thesis.md",
+            introduction: thesis::INTRODUCTION,
+            parts: thesis::PARTS.map(with_data).into(),
+        },
+        Plan {
+            name: "real",
+            file: "accuracy-real.md",
+            introduction: depth::real::INTRODUCTION,
+            parts: vec![with_data(("real", depth::real::measure))],
+        },
+    ]
+}
+
+fn check(what: &str, given: &[String], known: &[&str]) -> Result<()> {
+    match given.iter().find(|name| !known.contains(&name.as_str())) {
+        Some(unknown) => bail!("no {what} is called {unknown:?}, there are {}", known.join(", ")),
+        None => Ok(()),
+    }
+}
+
 fn run(arguments: &Arguments) -> Result<()> {
     chart::register_font()?;
     let images = arguments.docs.join("images");
     std::fs::create_dir_all(&images).with_context(|| format!("cannot make {}", images.display()))?;
-    let of_people = people::PARTS.iter().map(|(name, _)| *name);
-    let known = depth::RENDERED
-        .iter()
-        .chain(&robust::PARTS)
-        .map(|(name, _)| *name)
-        .chain(["real"])
-        .chain(thesis::PARTS.iter().map(|(name, _)| *name))
-        .chain(of_people)
-        .collect::<Vec<_>>();
-    if let Some(unknown) = arguments.only.iter().find(|name| !known.contains(&name.as_str())) {
-        bail!("no part is called {unknown:?}, there are {}", known.join(", "));
-    }
-    if let Some(unknown) = arguments.page.iter().find(|name| !PAGES.contains(&name.as_str())) {
-        bail!("no page is called {unknown:?}, there are {}", PAGES.join(", "));
-    }
-    let page_of = |name: &str| match name {
-        "real" => "real",
-        _ if depth::RENDERED.iter().any(|(part, _)| *part == name) => "accuracy",
-        _ if robust::PARTS.iter().any(|(part, _)| *part == name) => "robustness",
-        _ if thesis::PARTS.iter().any(|(part, _)| *part == name) => "thesis",
-        _ => "activity",
-    };
-    let wanted = |name: &str| {
-        let listed =
-            |list: &[String], name: &str| list.is_empty() || list.iter().any(|wanted| wanted == name);
-        listed(&arguments.only, name) && listed(&arguments.page, page_of(name))
-    };
-
-    if depth::RENDERED.iter().any(|(name, _)| wanted(name)) {
-        let mut page = Page::new(&images, depth::INTRODUCTION);
-        for (name, measure) in depth::RENDERED {
-            if wanted(name) {
-                eprintln!("{name}");
-                measure(&mut page).with_context(|| format!("measuring {name}"))?;
-            }
-        }
-        finish(page, arguments, "accuracy.md")?;
-    }
-    if robust::PARTS.iter().any(|(name, _)| wanted(name)) {
-        let mut page = Page::new(&images, robust::INTRODUCTION);
-        for (name, measure) in robust::PARTS {
-            if wanted(name) {
-                eprintln!("{name}");
-                measure(&mut page).with_context(|| format!("measuring {name}"))?;
-            }
-        }
-        finish(page, arguments, "robustness.md")?;
-    }
-
     let beside = || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data"));
-    let data = arguments.data.clone().unwrap_or_else(beside);
-    if people::PARTS.iter().any(|(name, _)| wanted(name)) {
-        let mut page = Page::new(&images, people::INTRODUCTION);
-        let data = people::data::Data(data.clone());
-        for (name, measure) in people::PARTS {
-            if wanted(name) {
-                eprintln!("{name}");
-                measure(&mut page, &data).with_context(|| format!("measuring {name}"))?;
-            }
+    let data = Data(arguments.data.clone().unwrap_or_else(beside));
+    let plans = plans(&data);
+    let parts: Vec<&str> = plans.iter().flat_map(|plan| &plan.parts).map(|(part, _)| *part).collect();
+    check("part", &arguments.only, &parts)?;
+    check("page", &arguments.page, &plans.each_ref().map(|plan| plan.name))?;
+    let listed = |list: &[String], name: &str| list.is_empty() || list.iter().any(|wanted| wanted == name);
+    for Plan { name, file, introduction, parts } in &plans {
+        let is_wanted = |part: &str| listed(&arguments.only, part) && listed(&arguments.page, name);
+        let wanted: Vec<_> = parts.iter().filter(|(part, _)| is_wanted(part)).collect();
+        if wanted.is_empty() {
+            continue;
         }
-        finish(page, arguments, "activity.md")?;
-    }
-    if thesis::PARTS.iter().any(|(name, _)| wanted(name)) {
-        let mut page = Page::new(&images, thesis::INTRODUCTION);
-        let data = people::data::Data(data.clone());
-        for (name, measure) in thesis::PARTS {
-            if wanted(name) {
-                eprintln!("{name}");
-                measure(&mut page, &data).with_context(|| format!("measuring {name}"))?;
-            }
+        if *name == "real" && !data.0.is_dir() {
+            let folder = data.0.display();
+            eprintln!("real: skipped, no real data ({folder} is not a folder); docs/accuracy-real.md stays");
+            continue;
         }
-        finish(page, arguments, "thesis.md")?;
+        let mut page = Page::new(&images, introduction);
+        for (part, measure) in wanted {
+            eprintln!("{part}");
+            measure(&mut page).with_context(|| format!("measuring {part}"))?;
+        }
+        finish(page, arguments, file)?;
     }
-    if !wanted("real") {
-        return Ok(());
-    }
-    if !data.is_dir() {
-        eprintln!(
-            "real: skipped, no real data ({} is not a folder); docs/accuracy-real.md stays",
-            data.display()
-        );
-        return Ok(());
-    }
-    eprintln!("real");
-    let mut page = Page::new(&images, depth::real::INTRODUCTION);
-    depth::real::measure(&mut page, &data).context("measuring real scenes")?;
-    finish(page, arguments, "accuracy-real.md")
+    Ok(())
 }
 
 fn finish(page: Page, arguments: &Arguments, name: &str) -> Result<()> {

@@ -73,6 +73,12 @@ pub fn mm(value: f64) -> String {
     if value.is_finite() { format!("{value:.3}") } else { "-".into() }
 }
 
+/// The upper one of two middle values; NaN without values.
+pub fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

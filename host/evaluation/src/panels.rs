@@ -47,6 +47,13 @@ pub fn row(panels: &[Panel<'_>]) -> Result<Vec<u8>> {
     grid(panels.len(), panels)
 }
 
+/// [`grid`] of maps with their titles, in one scale.
+pub fn titled(across: usize, maps: &[(String, Array2<f32>)], scale: Scale) -> Result<Vec<u8>> {
+    let panels: Vec<Panel<'_>> =
+        maps.iter().map(|(title, map)| Panel { title: title.clone(), map: map.view(), scale }).collect();
+    grid(across, &panels)
+}
+
 /// Panels of one size in rows of `across`; returns a PNG.
 pub fn grid(across: usize, panels: &[Panel<'_>]) -> Result<Vec<u8>> {
     let Some(first) = panels.first() else { bail!("a picture without panels") };

@@ -5,6 +5,7 @@
 //! everything else to stderr.
 
 mod commands;
+mod hang_up;
 mod hints;
 #[cfg(target_os = "linux")]
 mod huge_pages;

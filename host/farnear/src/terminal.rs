@@ -13,6 +13,8 @@ use std::{
 use anyhow::{Context as _, Result};
 use farnear_workflows::{Cancel, Context, Progress, Questions, WorkflowError};
 
+use crate::hang_up;
+
 /// Poll interval for the interruption.
 const LOOK: Duration = Duration::from_millis(50);
 /// Time for a computation to notice that it was cancelled.
@@ -64,16 +66,23 @@ pub fn context() -> Result<Context<'static>> {
     if CANCEL.get().is_none() {
         let cancel = Cancel::default();
         let wish = cancel.clone();
-        ctrlc::set_handler(move || {
+        let interrupted = move || {
             wish.cancel();
             if EXITS.load(Ordering::Relaxed) {
                 std::thread::sleep(GRACE);
                 farnear_files::staging::abandon_all();
-                say("farnear: interrupted; unfinished files were removed\n");
+                // A pipe that its reader does not empty would hold the message, and with it the exit.
+                let (said, heard) = channel();
+                std::thread::spawn(move || {
+                    say("farnear: interrupted; unfinished files were removed\n");
+                    let _ = said.send(()); // the program may have ended
+                });
+                let _ = heard.recv_timeout(LOOK); // it ends in any case
                 std::process::exit(1);
             }
-        })
-        .context("cannot listen for an interruption")?;
+        };
+        hang_up::keep_ignored(|| ctrlc::set_handler(interrupted))
+            .context("cannot listen for an interruption")?;
         let _ = CANCEL.set(cancel); // there is one thread that starts workflows
     }
     let cancel = CANCEL.get().cloned().unwrap_or_default();
@@ -95,8 +104,9 @@ pub fn computing(json: bool) -> Result<Context<'static>> {
 }
 
 /// For work of hours: counts with the remaining time. They are lines of their own if stderr is no terminal or
-/// figures come between.
+/// figures come between. Ctrl-C ends the program within 0.3 s.
 pub fn long_work() -> Result<Context<'static>> {
+    EXITS.store(true, Ordering::Relaxed);
     static LINES: Terminal = Terminal { counts: Counts::Lines };
     static RISING: Terminal = Terminal { counts: Counts::Rising };
     let rising = std::io::stderr().is_terminal() && !std::io::stdout().is_terminal();

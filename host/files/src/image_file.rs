@@ -229,7 +229,6 @@ pub fn read_grey_with(path: &Path, settings: &ReadSettings) -> Result<GreyImage,
     decoded.grey(settings).map_err(|reason| ImageError::Setting { path, reason })
 }
 
-/// Reads with 8 bits per sample: grey, or RGB (height, width, 3). 16 bits keep their upper half; floats are rejected.
 /// How 8 bits are made of the images of a folder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reading {
@@ -245,6 +244,7 @@ impl Default for Reading {
     }
 }
 
+/// Reads with 8 bits per sample: grey, or RGB (height, width, 3). 16 bits are scaled from [`Reading::bits`]; floats are rejected.
 pub(crate) fn read_8_bit(path: &Path, reading: Reading) -> Result<Samples8, ImageError> {
     let (decoded, path) = read_decoded(path)?;
     let decoded = if reading.opacity { decoded.alpha() } else { decoded };

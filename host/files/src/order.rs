@@ -81,6 +81,10 @@ pub fn same_stem(paths: &[PathBuf]) -> Option<[PathBuf; 2]> {
     paths.iter().find_map(|path| stems.insert(stem(path), path).map(|other| [other.clone(), path.clone()]))
 }
 
+pub(crate) fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
 /// A name without its ending, with full-width digits as ASCII.
 pub(crate) fn stem(path: &Path) -> String {
     let ascii = |c: char| {

@@ -17,6 +17,7 @@ use ndarray::Array2;
 
 use crate::{
     image_file::{self, Decoded, GreyImage, ImageError, Pages, ReadSettings},
+    order,
     video::VideoError,
 };
 pub use names::positions_in_names;
@@ -62,8 +63,7 @@ fn folder(path: &Path) -> Result<Stack, StackError> {
     if let [only] = images.as_slice() {
         return file(only).map(|stack| Stack { remarks: [remarks, stack.remarks].concat(), ..stack });
     }
-    let name = |image: &PathBuf| image.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let names: Vec<String> = images.iter().map(name).collect();
+    let names: Vec<String> = images.iter().map(|image| order::file_name(image)).collect();
     let Some(Pages { pages, .. }) = Pages::open(&images[0])? else {
         return Ok(Stack { remarks, images, ..Stack::default() });
     };

@@ -3,11 +3,11 @@
 use std::{
     collections::BTreeSet,
     ffi::{OsStr, OsString},
-    fs::{self, File},
+    fs::{self, File, TryLockError},
     io::{self, BufWriter, Write},
     path::{Path, PathBuf},
     sync::{Mutex, MutexGuard, PoisonError},
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 #[derive(Debug, thiserror::Error)]
@@ -28,6 +28,11 @@ impl StagingError {
 pub const PARTIAL: &str = ".partial-";
 /// A younger folder may be about to be locked by its program.
 const JUST_BEGUN: Duration = Duration::from_secs(10);
+/// Longest wait for another program that publishes into the same folder.
+const PUBLICATION_MAX: Duration = Duration::from_secs(if cfg!(test) { 10 } else { 1 });
+const LOOK: Duration = Duration::from_millis(5);
+/// Bytes of a temporary name that come from the final one: a name of 255 bytes has no room for more.
+const NAME_BYTES: usize = 200;
 /// Limit of leftover folders of one name, before the user must check.
 const LEFT_BEHIND_MAX: u32 = 100;
 
@@ -54,6 +59,30 @@ pub fn abandon_all() {
         let _ = target.map(fs::remove_dir); // fails if it is not empty, as intended
     }
     std::mem::forget(folders);
+}
+
+/// Runs `work`, which moves or removes files of a result. [`abandon_all`] waits for its end.
+pub fn uninterrupted<T>(work: impl FnOnce() -> T) -> T {
+    let _working = unpublished();
+    work()
+}
+
+/// A folder for unfinished files. Dropping it removes it, and so does [`abandon_all`].
+#[derive(Debug)]
+pub struct Unfinished(PathBuf);
+
+impl Unfinished {
+    pub fn new(folder: PathBuf) -> Self {
+        unpublished().push((folder.clone(), None));
+        Self(folder)
+    }
+}
+
+impl Drop for Unfinished {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0); // else the next run does
+        unpublished().retain(|(folder, _)| *folder != self.0);
+    }
 }
 
 /// A folder that appears under its name once complete. Dropping it earlier removes everything.
@@ -152,9 +181,10 @@ impl Staging {
 
     /// Publishes everything: a new folder with one rename, files with one rename each.
     pub fn finish(self) -> Result<(), StagingError> {
+        let into_folder = self.folder.parent() == Some(self.target.as_path());
+        let _alone = into_folder.then(|| lock_to_publish(&self.target));
         // Released before `self` is dropped.
         let _publishing = unpublished();
-        let into_folder = self.folder.parent() == Some(self.target.as_path());
         if !into_folder {
             if occupied(&self.target) {
                 return Err(StagingError::Exists { path: self.target.clone() });
@@ -229,15 +259,28 @@ fn sweep(folder: &Path) {
     }
 }
 
+/// Locks a folder while files move into it, so that two programs do not mix theirs. A lock that someone else keeps, such as
+/// flock(1) around this program, only delays the publication, and a system without locks of folders does not prevent it.
+fn lock_to_publish(folder: &Path) -> Option<File> {
+    let folder = File::open(folder).ok()?;
+    let start = Instant::now();
+    while matches!(folder.try_lock(), Err(TryLockError::WouldBlock)) && start.elapsed() < PUBLICATION_MAX {
+        std::thread::sleep(LOOK);
+    }
+    Some(folder)
+}
+
 /// Hidden and unique per process.
 fn partial_name(name: &str) -> String {
+    let name = &name[..name.floor_char_boundary(NAME_BYTES)];
     format!(".{name}{PARTIAL}{}", std::process::id())
 }
 
 fn occupied(path: &Path) -> bool {
     match fs::read_dir(path) {
         Ok(mut entries) => entries.next().is_some(),
-        Err(_) => path.exists(),
+        // A link without a target is an entry, too.
+        Err(_) => fs::symlink_metadata(path).is_ok(),
     }
 }
 
@@ -322,6 +365,42 @@ mod tests {
             dead.exists()
         };
         assert_eq!([begin("first"), begin("second")], [false, true]);
+    }
+
+    #[test]
+    fn names_may_be_as_long_as_the_system_allows() {
+        let root = tempfile::tempdir().unwrap();
+        // A two-byte letter lies across the limit.
+        let [file, folder] = ["f", "d"].map(|first| first.repeat(199) + &"\u{e9}".repeat(28));
+        assert_eq!(file.len(), 255);
+        write_file(&root.path().join(&file), b"1").unwrap();
+        Staging::new_folder(&root.path().join(&folder)).unwrap().finish().unwrap();
+        assert_eq!(names(root.path()), [folder, file]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_without_a_target_is_refused_before_the_work() {
+        let root = tempfile::tempdir().unwrap();
+        let link = root.path().join("link");
+        std::os::unix::fs::symlink("nowhere", &link).unwrap();
+        assert!(matches!(Staging::new_folder(&link), Err(StagingError::Exists { .. })));
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn two_programs_publish_into_a_folder_one_after_the_other() {
+        let root = tempfile::tempdir().unwrap();
+        let staged = Staging::into_folder(root.path()).unwrap();
+        staged.write("a", b"1").unwrap();
+        let other = File::open(root.path()).unwrap();
+        other.lock().unwrap();
+        let publishing = std::thread::spawn(move || staged.finish());
+        std::thread::sleep(Duration::from_millis(100));
+        assert!(!root.path().join("a").exists());
+        other.unlock().unwrap();
+        publishing.join().unwrap().unwrap();
+        assert_eq!(names(root.path()), ["a"]);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Times from silhouettes to points: `cargo bench -p farnear-recognition --bench embedding`. The gallery is 1500 seeded
 //! synthetic silhouettes. `-- --features FILE.npy` only writes its descriptors (N x 360).
-//! `FARNEAR_JSON=1` prints JSON lines. `landmark_20000` runs first, so the peak memory is its own.
+//! `FARNEAR_JSON=1` prints JSON lines. `landmark_isomap_20000` runs first, so the peak memory is its own.
 
 use std::{hint::black_box, io::Write, time::Instant};
 
@@ -9,7 +9,7 @@ use farnear_recognition::embedding::{
     geodesic::all_pairs,
     isomap::isomap,
     landmark::landmark_isomap,
-    neighbours::{Graph, Neighbourhood},
+    neighbours::Graph,
     rbf::Rbf,
 };
 use farnear_shadow::synthetic::scene::{Kind, scene};
@@ -23,7 +23,7 @@ use rayon::prelude::*;
 
 const GALLERY: usize = 1500;
 const LARGE: usize = 20_000;
-const NEIGHBOURHOOD: Neighbourhood = Neighbourhood::Nearest(12);
+const NEIGHBOURS: usize = 12;
 
 fn silhouette(i: usize) -> Mask {
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(i as u64);
@@ -114,7 +114,7 @@ fn main() -> std::io::Result<()> {
     drop(rows);
     let threads = std::thread::available_parallelism().map_or(1, usize::from).min(4);
     time("landmark_isomap_20000", threads, 1, 1, || {
-        landmark_isomap(large.view(), NEIGHBOURHOOD, 500, 3).expect("connected")
+        landmark_isomap(large.view(), NEIGHBOURS, 500, 3).expect("connected")
     });
     drop(large);
     if let Some(mib) = peak_mib() {
@@ -123,12 +123,12 @@ fn main() -> std::io::Result<()> {
     let masks: Vec<Mask> = (0..GALLERY).map(silhouette).collect();
     let all = described(&masks);
     time("descriptor", 1, 20, masks.len(), || described(&masks));
-    let laid_out = time("isomap_1500", 1, 9, 1, || isomap(all.view(), NEIGHBOURHOOD, 3)).expect("connected");
+    let laid_out = time("isomap_1500", 1, 9, 1, || isomap(all.view(), NEIGHBOURS, 3)).expect("connected");
     let graph =
-        time("neighbour_graph_1500", 1, 9, 1, || Graph::new(all.view(), NEIGHBOURHOOD)).expect("neighbours");
+        time("neighbour_graph_1500", 1, 9, 1, || Graph::new(all.view(), NEIGHBOURS)).expect("neighbours");
     time("geodesics_1500", 1, 9, 1, || all_pairs(&graph));
     if threads > 1 {
-        time("isomap_1500", threads, 15, 1, || isomap(all.view(), NEIGHBOURHOOD, 3)).expect("connected");
+        time("isomap_1500", threads, 15, 1, || isomap(all.view(), NEIGHBOURS, 3)).expect("connected");
     }
     let points = laid_out.coordinates.view();
     let rbf =
@@ -138,7 +138,7 @@ fn main() -> std::io::Result<()> {
     });
     time("training_from_1500_masks", 1, 3, 1, || {
         let descriptors = described(&masks);
-        let laid_out = isomap(descriptors.view(), NEIGHBOURHOOD, 3).expect("connected");
+        let laid_out = isomap(descriptors.view(), NEIGHBOURS, 3).expect("connected");
         Rbf::train(descriptors.view(), laid_out.coordinates.view(), 0.1, 1e-3).expect("solvable")
     });
     let scenes: Vec<_> = (0..40).map(|seed| scene(Kind::Standard, seed)).collect();

@@ -23,12 +23,11 @@ pub enum EmbeddingError {
     TooFewSamples { found: usize, needed: usize },
     #[error("sample {row} holds a value that is not finite")]
     NotFinite { row: usize },
-    #[error("the neighbour graph falls into {} parts ({}); raise the number of neighbours (now {neighbours}), or remove the separate samples", .components.len(), describe(.components))]
+    #[error("the neighbour graph falls into {} parts ({}); raise the number of neighbours (now the {neighbours} nearest), or remove the separate samples", .components.len(), describe(.components))]
     Disconnected {
         /// Samples of each part, largest first.
         components: Vec<Vec<usize>>,
-        /// The requested neighbourhood, in words.
-        neighbours: String,
+        neighbours: usize,
     },
     #[error(
         "only {found} eigenvalues are positive, but {asked} dimensions were requested: use at most {found}"

@@ -127,7 +127,6 @@ impl Experiment {
     pub fn thesis() -> Self {
         let grid = |bins: [usize; 3]| PatternKind::Thesis(bins.to_vec());
         Self {
-            space: SpaceSettings { pattern: grid([9, 9, 9]), ..SpaceSettings::thesis() },
             sweeps: vec![
                 Sweep::Gamma(vec![0.03, 0.1, 0.3, 1.0]),
                 Sweep::Pattern(vec![grid([6, 6, 6]), grid([9, 9, 9]), grid([15, 9, 9])]),
@@ -135,11 +134,7 @@ impl Experiment {
             sharpness: vec![1.0],
             classifiers: vec![ClassifierKind::Knn(1), ClassifierKind::Knn(3)],
             mirror: false,
-            inner_folds: 4,
-            align: Alignment::None,
-            self_training: 0,
-            features: None,
-            second: None,
+            ..Self::codebook(SpaceSettings { pattern: grid([9, 9, 9]), ..SpaceSettings::thesis() })
         }
     }
 

@@ -3,9 +3,10 @@
 use super::clip::Track;
 use super::model::{Answer, ModelError, Recogniser};
 use super::nearest::Nearest;
+use super::network::variation::Embedded;
 use super::patterns::joined as in_order;
 use farnear_silhouettes::mask::Mask;
-use ndarray::{Array1, Array2, Axis, concatenate};
+use ndarray::{Array1, Axis, concatenate};
 use std::collections::VecDeque;
 
 /// Keeps the last frames of every view. Each frame is embedded once and the nearest pattern comes from an
@@ -19,14 +20,8 @@ pub struct Live<'a> {
     frames: VecDeque<Moment>,
 }
 
-type Moment = Vec<Vec<Seen>>;
-
-/// A frame of a view, embedded; no row without a visible person.
-#[derive(Debug)]
-struct Seen {
-    points: Array2<f32>,
-    boxes: Option<Array2<f32>>,
-}
+/// A frame of each view; no row without a visible person.
+type Moment = Vec<Vec<Embedded>>;
 
 impl<'a> Live<'a> {
     /// Uses the last `window` frames (at least one).
@@ -48,8 +43,8 @@ impl<'a> Live<'a> {
     pub fn push_described(&mut self, moment: Vec<Track>) -> Result<Answer, ModelError> {
         self.recogniser.check(&moment)?;
         let boxed = self.recogniser.uses_boxes();
-        let seen = |view: Track| -> Result<Seen, ModelError> {
-            Ok(Seen { points: self.recogniser.space.points(&view)?, boxes: view.boxes.filter(|_| boxed) })
+        let seen = |view: Track| -> Result<Embedded, ModelError> {
+            Ok(Embedded { points: self.recogniser.space.points(&view)?, boxes: view.boxes.filter(|_| boxed) })
         };
         let opinions = self.recogniser.opinions(&moment).into_iter();
         let moment: Result<Moment, ModelError> =
@@ -65,7 +60,8 @@ impl<'a> Live<'a> {
 
     fn answer(&self, opinion: usize) -> Option<Answer> {
         let Recogniser { space, settings, .. } = self.recogniser;
-        let frames: Vec<&Vec<Seen>> = self.frames.iter().filter_map(|moment| moment.get(opinion)).collect();
+        let frames: Vec<&Vec<Embedded>> =
+            self.frames.iter().filter_map(|moment| moment.get(opinion)).collect();
         let views = frames.last()?.len();
         let mut seen = false;
         let patterns: Vec<Array1<f32>> = (0..views)

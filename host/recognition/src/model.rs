@@ -54,13 +54,13 @@ pub struct Recogniser {
     /// Training patterns, or prototypes of them; the outlier score is measured from the nearest. Empty for
     /// networks, whose probabilities separate unknown clips better than distances do.
     pub patterns: Array2<f32>,
-    /// Class of each of [`Self::patterns`] if they are training clips; empty for networks and older models.
+    /// Class of each of [`Self::patterns`] if they are training clips; empty for networks.
     pub labels: Vec<usize>,
     /// Auxiliary model for unknown clips and windows.
     pub second: Option<AuxiliaryModel>,
     /// Median frames of a training clip, the suggested window length.
     pub typical_frames: usize,
-    /// Clip lengths by class; empty in older models.
+    /// Clip lengths by class.
     pub lengths: Vec<Lengths>,
     /// Classes that are answered; empty for all. Not part of a model file.
     pub among: Vec<usize>,
@@ -368,7 +368,7 @@ pub(super) fn nearest<'a>(
     patterns.map(|row| squared_between(row, query)).fold(f32::INFINITY, f32::min)
 }
 
-fn squared_between(a: ArrayView1<f32>, b: ArrayView1<f32>) -> f32 {
+pub(super) fn squared_between(a: ArrayView1<f32>, b: ArrayView1<f32>) -> f32 {
     match (a.as_slice(), b.as_slice()) {
         (Some(a), Some(b)) => squared_distance(a, b),
         _ => a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum(),

@@ -1,17 +1,13 @@
 //! Model files: 8 bytes `farnearA`, format version (u32), descriptor version (u32), body length (u64), CRC-32 of the
 //! body (u32), little-endian; then the body (postcard), pattern classes, an optional auxiliary model, and clip lengths.
-//! Older, shorter versions are accepted. Decoded parts are checked against each other: a crafted file cannot panic.
+//! Decoded parts are checked against each other: a crafted file cannot panic.
 
 use super::auxiliary_model::AuxiliaryModel;
 use super::classifier::Classifier;
 use super::clip::BOX_NUMBERS;
-use super::codebook::Codebook;
 use super::frames::Mode;
 use super::lengths::Lengths;
 use super::model::{ModelError, Recogniser, RecogniserSettings};
-use super::network::features::Features;
-use super::network::{Layers, Network};
-use super::occupancy::OccupancyGrid;
 use super::space::{Map, Pattern, Space};
 use super::unknown::Limits;
 use crate::embedding::{
@@ -19,20 +15,12 @@ use crate::embedding::{
     pca::Pca,
     rbf::Rbf,
 };
-use ndarray::{Array1, Array2};
+use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Version of the file format.
-pub const FORMAT_VERSION: u32 = 6;
-/// Version without clip lengths.
-const LENGTHLESS_VERSION: u32 = 5;
-/// Version with an auxiliary model in every file.
-const SECOND_VERSION: u32 = 4;
-/// Version without auxiliary models.
-const SINGLE_VERSION: u32 = 3;
-/// Version without pattern classes.
-const UNLABELLED_VERSION: u32 = 2;
+pub const FORMAT_VERSION: u32 = 7;
 const MAGIC: &[u8; 8] = b"farnearA";
 const HEADER: usize = 28;
 
@@ -44,7 +32,7 @@ struct Body {
     map: SavedMap,
     spread: f32,
     neighbours: usize,
-    pattern: SavedPattern,
+    pattern: Pattern,
     classifier: Classifier,
     limits: Limits,
     patterns: Array2<f32>,
@@ -54,54 +42,7 @@ struct Body {
 #[derive(Serialize, Deserialize)]
 enum SavedMap {
     Rbf { centres: Array2<f32>, weights: Array2<f32>, gamma: f32, ridge: f64, condition: f64 },
-    Pca { mean: Array1<f32>, directions: Array2<f32>, variances: Vec<f64> },
-}
-
-#[derive(Serialize, Deserialize)]
-enum SavedPattern {
-    Thesis(OccupancyGrid),
-    Codebook(Codebook),
-    Network(Box<OneMember>),
-    Features(Box<OneMember>, Array1<f32>, Array1<f32>),
-    Members(Box<Network>),
-    FeaturesOfMembers(Box<Features>),
-}
-
-#[derive(Serialize, Deserialize)]
-struct OneMember {
-    mean: Array1<f32>,
-    spread: Array1<f32>,
-    layers: Layers,
-}
-
-impl From<OneMember> for Network {
-    fn from(OneMember { mean, spread, layers }: OneMember) -> Self {
-        Self { mean, spread, members: vec![layers] }
-    }
-}
-
-impl SavedPattern {
-    fn of(pattern: &Pattern) -> Self {
-        match pattern {
-            Pattern::Thesis(grid) => Self::Thesis(grid.clone()),
-            Pattern::Codebook(book) => Self::Codebook(book.clone()),
-            Pattern::Network(network) => Self::Members(network.clone()),
-            Pattern::Features(features) => Self::FeaturesOfMembers(features.clone()),
-        }
-    }
-
-    fn read(self) -> Pattern {
-        match self {
-            Self::Thesis(grid) => Pattern::Thesis(grid),
-            Self::Codebook(book) => Pattern::Codebook(book),
-            Self::Network(one) => Pattern::Network(Box::new((*one).into())),
-            Self::Features(one, mean, scale) => {
-                Pattern::Features(Box::new(Features { network: (*one).into(), mean, scale }))
-            }
-            Self::Members(network) => Pattern::Network(network),
-            Self::FeaturesOfMembers(features) => Pattern::Features(features),
-        }
-    }
+    Pca(Pca),
 }
 
 /// Whether a file that begins with `bytes` is a model, of any version.
@@ -112,17 +53,6 @@ pub fn is_model(bytes: &[u8]) -> bool {
 
 type SavedAuxiliary = (Vec<u8>, Array2<f32>, Limits);
 
-fn framed(version: u32, body: &[u8]) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(HEADER + body.len());
-    bytes.extend(MAGIC);
-    bytes.extend(version.to_le_bytes());
-    bytes.extend(DESCRIPTOR_VERSION.to_le_bytes());
-    bytes.extend((body.len() as u64).to_le_bytes());
-    bytes.extend(checksum(body).to_le_bytes());
-    bytes.extend(body);
-    bytes
-}
-
 impl Recogniser {
     /// Encodes the model; fails with [`ModelError::Body`].
     pub fn to_bytes(&self) -> Result<Vec<u8>, ModelError> {
@@ -130,8 +60,16 @@ impl Recogniser {
             Ok((second.recogniser.to_bytes()?, second.profiles.clone(), second.limits.clone()))
         };
         let second = self.second.as_ref().map(saved).transpose()?;
-        let encoded = postcard::to_stdvec(&(self.body(), &self.labels, second, &self.lengths));
-        Ok(framed(FORMAT_VERSION, &encoded.map_err(|error| ModelError::Body(error.to_string()))?))
+        let body = postcard::to_stdvec(&(self.body(), &self.labels, second, &self.lengths))
+            .map_err(|error| ModelError::Body(error.to_string()))?;
+        let mut bytes = Vec::with_capacity(HEADER + body.len());
+        bytes.extend(MAGIC);
+        bytes.extend(FORMAT_VERSION.to_le_bytes());
+        bytes.extend(DESCRIPTOR_VERSION.to_le_bytes());
+        bytes.extend((body.len() as u64).to_le_bytes());
+        bytes.extend(checksum(&body).to_le_bytes());
+        bytes.extend(body);
+        Ok(bytes)
     }
 
     fn body(&self) -> Body {
@@ -147,15 +85,11 @@ impl Recogniser {
                     ridge: rbf.ridge,
                     condition: rbf.condition,
                 },
-                Map::Pca(pca) => SavedMap::Pca {
-                    mean: pca.mean.clone(),
-                    directions: pca.directions.clone(),
-                    variances: pca.variances.clone(),
-                },
+                Map::Pca(pca) => SavedMap::Pca(pca.clone()),
             },
             spread: self.space.spread,
             neighbours: self.space.neighbours,
-            pattern: SavedPattern::of(&self.space.pattern),
+            pattern: self.space.pattern.clone(),
             classifier: self.classifier.clone(),
             limits: self.limits.clone(),
             patterns: self.patterns.clone(),
@@ -163,7 +97,7 @@ impl Recogniser {
         }
     }
 
-    /// Decodes a whole, undamaged model of a known format and this descriptor version.
+    /// Decodes a whole, undamaged model of this format and descriptor version.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, ModelError> {
         Self::read(bytes, true)
     }
@@ -175,9 +109,9 @@ impl Recogniser {
             return Err(ModelError::NotAModel("it does not start with `farnearA`"));
         }
         let word = |at: usize| u32::from_le_bytes(header[at..at + 4].try_into().unwrap_or_default());
-        let version = word(8);
-        if !(UNLABELLED_VERSION..=FORMAT_VERSION).contains(&version) {
-            return Err(ModelError::Version { what: "format", found: version, expected: FORMAT_VERSION });
+        if word(8) != FORMAT_VERSION {
+            let (found, expected) = (word(8), FORMAT_VERSION);
+            return Err(ModelError::Version { what: "format", found, expected });
         }
         if word(12) != DESCRIPTOR_VERSION {
             let (found, expected) = (word(12), DESCRIPTOR_VERSION);
@@ -191,20 +125,8 @@ impl Recogniser {
             return Err(ModelError::Checksum { found: checksum(body), expected: word(24) });
         }
         let wrong = |error: postcard::Error| ModelError::Body(error.to_string());
-        let (body, rest) = postcard::take_from_bytes::<Body>(body).map_err(wrong)?;
-        let (labels, second, lengths): (Vec<usize>, Option<SavedAuxiliary>, Vec<Lengths>) = match version {
-            UNLABELLED_VERSION => Default::default(),
-            SINGLE_VERSION => (postcard::from_bytes(rest).map_err(wrong)?, None, Vec::new()),
-            SECOND_VERSION => {
-                let (labels, other, profiles, limits) = postcard::from_bytes(rest).map_err(wrong)?;
-                (labels, Some((other, profiles, limits)), Vec::new())
-            }
-            LENGTHLESS_VERSION => {
-                let (labels, second) = postcard::from_bytes(rest).map_err(wrong)?;
-                (labels, second, Vec::new())
-            }
-            _ => postcard::from_bytes(rest).map_err(wrong)?,
-        };
+        let (body, labels, second, lengths): (Body, Vec<usize>, Option<SavedAuxiliary>, Vec<Lengths>) =
+            postcard::from_bytes(body).map_err(wrong)?;
         let second = match second {
             None => None,
             Some(_) if !may_have_second => return Err(ModelError::Parts("the auxiliary model")),
@@ -217,14 +139,13 @@ impl Recogniser {
             SavedMap::Rbf { centres, weights, gamma, ridge, condition } => {
                 Map::Rbf(Rbf::assemble(centres, weights, gamma, ridge, condition))
             }
-            SavedMap::Pca { mean, directions, variances } => Map::Pca(Pca { mean, directions, variances }),
+            SavedMap::Pca(pca) => Map::Pca(pca),
         };
-        let pattern = body.pattern.read();
         let space = Space {
             settings: body.settings.space.clone(),
             map,
             spread: body.spread,
-            pattern,
+            pattern: body.pattern,
             neighbours: body.neighbours,
             brought: None,
         };
@@ -310,7 +231,7 @@ impl Recogniser {
         fits(self.classifier.fits(width, self.activities.len()), "the classifier")?;
         let measured =
             self.lengths.len() == self.activities.len() && self.lengths.iter().all(Lengths::is_sound);
-        fits(self.lengths.is_empty() || measured, "how long clips last")?;
+        fits(measured, "how long clips last")?;
         let second = self.second.as_ref();
         let judges = second.is_none_or(|second| second.fits(self.activities.len(), self.uses_boxes()));
         fits(judges, "the auxiliary model")?;
@@ -340,31 +261,6 @@ mod tests {
             .expect("trained")
     }
 
-    fn written_before(model: &Recogniser, version: u32) -> Vec<u8> {
-        let mut body = model.body();
-        // In version 3 a network was its mean, spread and three layers without a count.
-        if let (Pattern::Network(network), SINGLE_VERSION) = (&model.space.pattern, version) {
-            let [layers] = &network.members[..] else { panic!("one member") };
-            let (mean, spread) = (network.mean.clone(), network.spread.clone());
-            body.pattern =
-                SavedPattern::Network(Box::new(OneMember { mean, spread, layers: layers.clone() }));
-        }
-        let second = model.second.as_ref().map(|second| -> SavedAuxiliary {
-            let other = written_before(&second.recogniser, LENGTHLESS_VERSION);
-            (other, second.profiles.clone(), second.limits.clone())
-        });
-        let labels = &model.labels;
-        let encoded = match (version, second) {
-            (UNLABELLED_VERSION, _) => postcard::to_stdvec(&body),
-            (SINGLE_VERSION, _) => postcard::to_stdvec(&(body, labels)),
-            (SECOND_VERSION, Some((other, profiles, limits))) => {
-                postcard::to_stdvec(&(body, labels, other, profiles, limits))
-            }
-            (_, second) => postcard::to_stdvec(&(body, labels, second)),
-        };
-        framed(version, &encoded.expect("encoded"))
-    }
-
     fn with_second(of: &Recogniser, by: &Recogniser) -> Recogniser {
         let limits = Limits::none(of.activities.len());
         let profiles = Array2::zeros((of.activities.len(), by.activities.len()));
@@ -373,23 +269,11 @@ mod tests {
     }
 
     #[test]
-    fn files_of_all_versions_are_read() {
-        let lengthless = |model: &Recogniser| Recogniser { lengths: Vec::new(), ..model.clone() };
+    fn files_are_read_as_written() {
         let (one, two) = (model(1), model(2));
-        let [one_before, two_before] = [&one, &two].map(lengthless);
-        let read = |bytes: &[u8]| Recogniser::from_bytes(bytes).expect("decoded");
-        for (model, version) in [
-            (&one_before, UNLABELLED_VERSION),
-            (&one_before, SINGLE_VERSION),
-            (&with_second(&one_before, &two_before), SECOND_VERSION),
-            (&two_before, LENGTHLESS_VERSION),
-            (&with_second(&two_before, &one_before), LENGTHLESS_VERSION),
-        ] {
-            assert_eq!(&read(&written_before(model, version)), model, "version {version}");
-        }
         for model in [&one, &two, &with_second(&two, &one)] {
             let bytes = model.to_bytes().expect("encoded");
-            assert_eq!((u32::from(bytes[8]), &read(&bytes)), (FORMAT_VERSION, model));
+            assert_eq!(&Recogniser::from_bytes(&bytes).expect("decoded"), model);
         }
         let nested = with_second(&two, &with_second(&two, &two)).to_bytes().expect("encoded");
         assert!(Recogniser::from_bytes(&nested).is_err(), "nested without end");

@@ -2,7 +2,7 @@
 //! residual lengths bound distances from below; only patterns with a bound below the best distance are
 //! compared. O(patterns x directions).
 
-use crate::embedding::squared_distance;
+use super::model::squared_between;
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};
 
 const DIRECTIONS: usize = 64;
@@ -37,10 +37,7 @@ impl<'a> Nearest<'a> {
     /// Squared distance to the nearest pattern; infinite without any.
     pub fn squared_distance(&self, query: ArrayView1<f32>) -> f32 {
         let query = query.as_standard_layout();
-        let exact = |row: usize| match (self.patterns.row(row).as_slice(), query.as_slice()) {
-            (Some(row), Some(query)) => squared_distance(row, query),
-            _ => self.patterns.row(row).iter().zip(&query).map(|(a, b)| (a - b) * (a - b)).sum(),
-        };
+        let exact = |row: usize| squared_between(self.patterns.row(row), query.view());
         if self.directions.is_empty() {
             return (0..self.patterns.nrows()).map(exact).fold(f32::INFINITY, f32::min);
         }
@@ -51,13 +48,7 @@ impl<'a> Nearest<'a> {
             .rows()
             .into_iter()
             .zip(&self.outside)
-            .map(|(row, own)| {
-                let apart = match (row.as_slice(), inside.as_slice()) {
-                    (Some(row), Some(inside)) => squared_distance(row, inside),
-                    _ => 0.0,
-                };
-                apart + (own - outside).powi(2)
-            })
+            .map(|(row, own)| squared_between(row, inside.view()) + (own - outside).powi(2))
             .collect();
         let likeliest =
             (0..bounds.len()).fold(0, |best, row| if bounds[row] < bounds[best] { row } else { best });

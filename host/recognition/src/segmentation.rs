@@ -9,8 +9,9 @@ use super::lengths::Lengths;
 use super::live::Segment;
 use super::model::{Answer, ModelError, Recogniser};
 use super::nearest::Nearest;
+use super::network::variation::Embedded;
 use super::patterns::joined;
-use ndarray::{Array1, Array2, s};
+use ndarray::{Array1, s};
 use rayon::prelude::*;
 
 /// Score parameters of a segmentation.
@@ -35,11 +36,6 @@ const PLACES: usize = 12;
 /// Ratio of successive lengths.
 const LONGER: f32 = 1.15;
 const LEAST: usize = 4;
-
-struct Embedded {
-    points: Array2<f32>,
-    boxes: Option<Array2<f32>>,
-}
 
 struct Recording<'a> {
     recogniser: &'a Recogniser,
@@ -219,6 +215,7 @@ mod tests {
     use crate::live::{Live, joined};
     use crate::model::RecogniserSettings;
     use crate::space::{PatternKind, SpaceSettings};
+    use ndarray::Array2;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 

@@ -12,7 +12,6 @@ use crate::embedding::{
     descriptor::{ANGLES, CELLS},
     isomap::isomap,
     landmark::landmark_isomap,
-    neighbours::Neighbourhood,
     pca::Pca,
     rbf::Rbf,
 };
@@ -100,8 +99,8 @@ pub enum Map {
     Pca(Pca),
 }
 
-/// Patterns of embedded clips.
-#[derive(Clone, Debug, PartialEq)]
+/// Patterns of embedded clips. Model files number them in this order: append new ones.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum Pattern {
     Thesis(OccupancyGrid),
@@ -334,12 +333,11 @@ impl Gallery {
         };
         let mut neighbours = least.clamp(1, samples.nrows().saturating_sub(1).max(1));
         let coordinates = loop {
-            let near = Neighbourhood::Nearest(neighbours);
             let tried = if samples.nrows() > LARGE {
-                landmark_isomap(samples.view(), near, 500, settings.dimensions)
+                landmark_isomap(samples.view(), neighbours, 500, settings.dimensions)
                     .map(|laid_out| laid_out.coordinates)
             } else {
-                isomap(samples.view(), near, settings.dimensions).map(|laid_out| laid_out.coordinates)
+                isomap(samples.view(), neighbours, settings.dimensions).map(|laid_out| laid_out.coordinates)
             };
             match tried {
                 Err(EmbeddingError::Disconnected { .. }) if 2 * neighbours < samples.nrows() => {

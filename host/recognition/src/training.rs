@@ -1,6 +1,5 @@
 //! Training of a recogniser: settings, classifier, unknown limits.
 
-use super::alignment::Alignment;
 use super::auxiliary_model::AuxiliaryModel;
 use super::choice::{Chosen, Views, choose, names};
 use super::classifier::Classifier;
@@ -19,16 +18,11 @@ impl Recogniser {
     /// Trains with fixed settings. Fails for fewer than two activities or unequal views.
     pub fn train(clips: &[Clip], settings: &RecogniserSettings) -> Result<Self, ModelError> {
         let experiment = Experiment {
-            space: settings.space.clone(),
-            sweeps: Vec::new(),
             sharpness: vec![settings.sharpness],
             classifiers: vec![settings.classifier],
             mirror: settings.mirror,
             inner_folds: 2,
-            align: Alignment::None,
-            self_training: 0,
-            features: None,
-            second: None,
+            ..Experiment::codebook(settings.space.clone())
         };
         Self::train_searched(clips, &experiment, settings.scaling, &Unwatched)
             .map(|(recogniser, _)| recogniser)

@@ -1,6 +1,6 @@
 // Depth of a capture: map, confidence, deviation, images, surface; probe, profile, region; two layers compared by a wipe.
 import { act, bytes, ended, get, on, onJob, store } from "./link.js";
-import { h, button, choice, field, number, optional, panel, notice } from "./ui.js";
+import { h, altered, button, choice, field, number, optional, panel, notice } from "./ui.js";
 import { Viewer } from "./viewer.js";
 import { bars } from "./plot.js";
 import { NAMES, bar, paint, range } from "./maps.js";
@@ -38,7 +38,7 @@ export function make(host, remember) {
   const reasons = h("div", { class: "reasons" });
   const [least, most] = ["Low", "High"].map((text) => h("input", { type: "number", step: "any", placeholder: "auto", "aria-label": `${text} end of the colours, mm`, onchange: () => refresh() }));
   /** Ends of the colours that were typed. @returns {[number, number] | null} */
-  const manual = () => (least.value !== "" && most.value !== "" && Number(least.value) < Number(most.value) ? [Number(least.value), Number(most.value)] : null);
+  const manual = () => (!altered(least) && !altered(most) && least.value !== "" && most.value !== "" && Number(least.value) < Number(most.value) ? [Number(least.value), Number(most.value)] : null);
   const histogram = h("canvas", { class: "histogram", role: "img", "aria-label": "distribution of the values" });
   const empty = h("p", { class: "empty" }, "No depth yet. Capture a pair in Live, or compute one here.");
   const other = h("select", { "aria-label": "Compare with", onchange: (event) => { show.other = event.target.value; refresh(); } });
@@ -99,7 +99,7 @@ export function make(host, remember) {
   /** Selects a capture. A comparison with another map of the capture before ends. @param {string} name */
   const select = (name) => {
     if (name !== show.name && /^(variant|minus):/.test(show.other)) other.value = show.other = "";
-    show.name = name;
+    show.name = captures.value = name;
   };
   /** Replaces the maps. Figures and surface of those before are removed. */
   const replace = (maps) => {
@@ -116,6 +116,13 @@ export function make(host, remember) {
     const present = show.other;
     const option = (value, text) => h("option", { value, selected: value === present }, text);
     const own = found.find((capture) => capture.name === show.name);
+    // It was deleted or renamed: its maps do not stay under the name of another.
+    if (!own && show.capture && show.capture.name === show.name) {
+      show.loading++;
+      replace({});
+      [show.name, show.of, show.capture] = [null, null, null];
+      refresh();
+    }
     other.replaceChildren(option("", "nothing"),
       ...LAYERS.slice(0, -1).map(([name, text]) => option(`layer:${name}`, text)),
       ...(own?.variants ?? []).map((name) => option(`variant:${name}`, `this, by ${name}`)),
@@ -132,7 +139,7 @@ export function make(host, remember) {
   }
 
   async function open(name, again = false) {
-    if (!name || (name === show.name && !again)) return;
+    if (!name || (name === show.name && name === show.of && !again)) return;
     const loading = ++show.loading;
     select(name);
     remember(name);
@@ -160,14 +167,12 @@ export function make(host, remember) {
     } catch (error) {
       if (loading !== show.loading) return;
       notice(error.message, "error", error.hint);
-      if (show.of === name) {
-        // Maps of before do not stay next to new ones.
-        if (replaced.length) show.maps = Object.fromEntries(replaced.map((layer) => [layer, show.maps[layer]]));
-        return void refresh();
+      // Maps of before stay neither next to new ones nor under this name.
+      if (replaced.length) show.maps = Object.fromEntries(replaced.map((layer) => [layer, show.maps[layer]]));
+      else {
+        replace({});
+        [show.capture, show.of] = [null, null]; // it can be opened again
       }
-      // The picture of the capture before does not stay under this name.
-      show.capture = null;
-      replace({});
       refresh();
     }
   }
@@ -281,7 +286,7 @@ export function make(host, remember) {
 
   /** Picture to the right of the wipe. @returns {Promise<Compared>} */
   async function compared() {
-    const [kind, name] = show.other.split(":");
+    const [, kind, name] = /^(\w+):(.+)$/.exec(show.other) ?? []; // a name may have a colon, too
     if (!name) return {};
     if (kind === "layer") {
       const map = show.maps[name];
@@ -423,7 +428,7 @@ const SHOWN = ["method", "window", "median_px", "fill", "corrected", "variant", 
 
 /** The panel that computes the depth of a stack. */
 function computeStack(name, done) {
-  const more = furtherOptions("CaptureStackRequest");
+  const more = furtherOptions("FocusStackRequest");
   const start = async () => {
     const begun = name() && (await act(`/api/captures/${encodeURIComponent(name())}/stack`, more.values));
     if (begun && (await ended("computation", begun.job)).phase === "done") done();
@@ -444,7 +449,8 @@ function furtherOptions(request) {
     try {
       const { components } = await get("/openapi.json");
       const all = /** @type {[string, any][]} */ (Object.entries(components.schemas[request].properties));
-      inputs = all.filter(([name]) => !SHOWN.includes(name)).map(([name, { type, default: usual, description }]) => {
+      // Lists have no field: they come from the capture's record.
+      inputs = all.filter(([name, { type }]) => !SHOWN.includes(name) && ![type].flat().includes("array")).map(([name, { type, default: usual, description }]) => {
         const [kind] = [type].flat();
         const input = /** @type {HTMLInputElement} */ (h("input", { type: kind === "boolean" ? "checkbox" : kind === "string" ? "text" : "number", step: "any", name, title: description, placeholder: usual ?? "default" }));
         return [name, kind, input];

@@ -1,6 +1,6 @@
 // The keyboard. Esc stops the rig from anywhere, also while something is typed.
 import { stop } from "./link.js";
-import { h, button, popUp } from "./ui.js";
+import { h, button, notice, popUp } from "./ui.js";
 
 const keys = new Map();
 
@@ -9,9 +9,38 @@ export function key(name, about, action) {
   keys.set(name, { about, action });
 }
 
+/** Some browsers drop these from a number: "12,5" becomes 125, and a minus copied from the page is lost. */
+const DROPPED = /[,\u066b\u2212]/;
+
+/** Such a number is not used until a part of it is deleted. */
+function refuse(event) {
+  const { target, data } = event;
+  if (!(target instanceof HTMLInputElement && target.type === "number" && data && DROPPED.test(data))) return;
+  event.preventDefault();
+  target.setAttribute("aria-invalid", "true");
+  target.dataset.length = String(target.value.length);
+  target.dataset.typed = target.value;
+  notice(`${data}: expected a number with a decimal point, and a hyphen as the minus`, "warning");
+}
+
+function accept({ target }) {
+  if (!(target instanceof HTMLInputElement && target.dataset.length)) return;
+  const { length } = target.value;
+  if (length > Number(target.dataset.length)) {
+    target.dataset.length = String(length);
+    target.dataset.typed = target.value;
+  } else {
+    target.removeAttribute("aria-invalid");
+    delete target.dataset.length;
+    delete target.dataset.typed;
+  }
+}
+
 /** Listens to the keyboard. */
 export function listen() {
   key("?", "This list", help);
+  addEventListener("beforeinput", refuse);
+  addEventListener("input", accept);
   addEventListener("keydown", (event) => {
     if (event.key === "Escape") {
       stop();

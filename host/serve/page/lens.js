@@ -1,6 +1,6 @@
 // The optics as they are typed, drawn to scale, and what follows from them.
 import { act, call, hasControl, get, on } from "./link.js";
-import { h, s, button, choice, field, number, optional, panel, rows } from "./ui.js";
+import { h, s, button, choice, field, notice, number, optional, panel, rows } from "./ui.js";
 import { Plot } from "./plot.js";
 
 const MODELS = [["pillbox", "Pill-box"], ["gaussian", "Gaussian"], ["generalised", "Generalised Gaussian"]];
@@ -22,7 +22,7 @@ export function make(host) {
   const using = h("p", { class: "dim" });
   const p = field("Exponent p", inputs.p);
   host.append(h("div", { class: "split" },
-    h("div", { class: "stage scroll" }, panel("Drawn to scale", drawing), panel("What follows", results), panel("Blur over the working range", place,
+    h("div", { class: "stage scroll", tabindex: "0", role: "region", "aria-label": "What follows from the optics" }, panel("Drawn to scale", drawing), panel("What follows", results), panel("Blur over the working range", place,
       h("p", { class: "legend" }, h("span", { class: "key a" }), "far-focused image ", h("span", { class: "key b" }), "near-focused image"))),
     h("div", { class: "side" },
       panel("Lens and sensor", field("Focal length", inputs.focal, "mm"), field("Aperture", inputs.aperture, "mm"), field("Pixel", inputs.pixel, "µm")),
@@ -33,7 +33,16 @@ export function make(host) {
       h("div", { class: "panel" }, wrong, use, using))));
 
   let waiting = 0;
-  const later = () => { clearTimeout(waiting); waiting = setTimeout(calculate, 120); };
+  /** Grows with every change: an answer to the fields of before is dropped. */
+  let changes = 0;
+  /** Whether a change awaits its answer. */
+  let stale = false;
+  const later = () => {
+    changes++;
+    stale = Boolean(read);
+    clearTimeout(waiting);
+    waiting = setTimeout(calculate, 120);
+  };
   for (const control of Object.values(inputs)) control.addEventListener("input", later);
   const fields = [...Object.values(inputs), model];
   /** The optics in use. @type {any} */
@@ -70,16 +79,20 @@ export function make(host) {
     p.hidden = model.value !== "generalised";
     inputs.k.parentElement.hidden = model.value === "pillbox" || model.value === "";
     if (!read) return;
+    const asked = ++changes;
     try {
       const readings = { far_mm: optional(inputs.m1), near_mm: optional(inputs.m2) };
       const { figures } = await call("POST", "/api/optics/calculate", { optics: typed(), readings });
+      if (asked !== changes) return;
       wrong.textContent = "";
       complete = figures.optics;
       show(figures);
     } catch (error) {
+      if (asked !== changes) return;
       complete = null;
       wrong.textContent = error.message;
     }
+    stale = false;
     use.disabled = !complete || !hasControl();
   }
 
@@ -101,6 +114,7 @@ export function make(host) {
   }
 
   async function save() {
+    while (stale) await calculate(); // pressed before the answer
     if (complete && (await act("/api/optics", { optics: complete }, "PUT"))) using.textContent = "In use for captures from now on.";
   }
 
@@ -125,7 +139,7 @@ export function make(host) {
     // Optics that change while a field is in use are loaded after that.
     if (state.optics === loaded || host.contains(document.activeElement)) return;
     loaded = state.optics;
-    load();
+    load().catch((error) => notice(error.message, "error", error.hint));
   });
   return { shown: () => plot.size() };
 }

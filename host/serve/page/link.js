@@ -16,6 +16,16 @@ let wait = 250;
 let server = "";
 /** Where the secret of this page survives a reload. */
 const SECRET = "farnear-client";
+/** The secret is stored only while the page is loaded again: a duplicated tab gets a copy of the storage, and would take control. */
+let secret = sessionStorage.getItem(SECRET);
+sessionStorage.removeItem(SECRET);
+addEventListener("pagehide", () => secret && sessionStorage.setItem(SECRET, secret));
+addEventListener("pageshow", () => sessionStorage.removeItem(SECRET));
+/** Seconds without a message after which the connection is lost. The server sends one every two seconds. */
+const QUIET = 8;
+let quiet = 0;
+/** Longest wait for the answer to a stop, ms. The server answers within a second. */
+const STOPPED = 3000;
 
 /** Listens to `state`, `image`, `depth` or `link`; gives what ends it. */
 export function on(event, listener) {
@@ -36,18 +46,36 @@ export function hasControl() {
 /** Opens the socket, and opens it again whenever it breaks. */
 export function open() {
   // After a reload the page keeps control: it shows that it is the same page.
-  const before = sessionStorage.getItem(SECRET);
-  socket = new WebSocket(`ws://${location.host}/api/socket${before ? `?resume=${before}` : ""}`);
-  socket.binaryType = "arraybuffer";
-  socket.onmessage = ({ data }) => (typeof data === "string" ? told(JSON.parse(data)) : pictured(data));
-  socket.onclose = () => {
-    store.connected = false;
-    store.client = null;
-    emit("link");
-    setTimeout(open, wait);
-    wait = Math.min(2 * wait, 4000);
+  const opened = new WebSocket(`ws://${location.host}/api/socket${secret ? `?resume=${secret}` : ""}`);
+  [socket, quiet] = [opened, 0];
+  opened.binaryType = "arraybuffer";
+  opened.onmessage = ({ data }) => {
+    if (socket !== opened) return;
+    quiet = 0;
+    if (typeof data === "string") told(JSON.parse(data));
+    else pictured(data);
   };
+  opened.onclose = () => lost(opened);
 }
+
+/** Opens another socket. The browser may report the end of one whose server has vanished minutes later, or never. */
+function lost(ended) {
+  if (socket !== ended) return;
+  socket = null;
+  store.connected = false;
+  store.client = null;
+  emit("link");
+  setTimeout(open, wait);
+  wait = Math.min(2 * wait, 4000);
+}
+
+// Ticks are counted, not time: a page that was busy or asleep has missed both messages and ticks.
+setInterval(() => {
+  const silent = socket;
+  if (!silent || ++quiet <= QUIET) return;
+  lost(silent);
+  silent.close();
+}, 1000);
 
 function told(message) {
   if (message.type === "hello") {
@@ -55,7 +83,7 @@ function told(message) {
     if (server && server !== message.hello.server) return location.reload();
     server = message.hello.server;
     store.client = message.hello;
-    sessionStorage.setItem(SECRET, message.hello.secret);
+    secret = message.hello.secret;
     store.connected = true;
     wait = 250;
     emit("link");
@@ -108,10 +136,11 @@ export async function act(path, body = {}, method = "POST") {
   }
 }
 
-/** Stops the rig. The socket is the shortest way, but a dead connection loses the message. A request that fails is reported. */
+/** Stops the rig. The socket is the shortest way, but a dead connection loses the message. A request that fails or is late is reported. */
 export function stop() {
   if (socket?.readyState === WebSocket.OPEN) socket.send('{"type":"stop"}');
-  act("/api/stop");
+  const late = setTimeout(() => notice("farnear has not answered the stop.", "error", "Use the emergency stop of the rig if something moves."), STOPPED);
+  act("/api/stop").finally(() => clearTimeout(late));
 }
 
 /** Bytes of a file. @param {string} path */

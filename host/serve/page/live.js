@@ -134,7 +134,7 @@ export function make(host) {
       notice(`The brightest pixels have ${number((100 * code) / 255, 0)} % of white at ${exposure_us} µs: change the light or the gain.`, "warning");
     } else act("/api/live", { exposure_us: next });
   };
-  const light = [0, 1].map(() => h("input", { type: "number", min: 0, max: 100, title: "Light output of the board during captures and live depth" }));
+  const light = [0, 1].map(() => h("input", { type: "number", min: 0, max: 100, step: 0.1, title: "Light output of the board during captures and live depth" }));
   for (const level of light) level.addEventListener("change", () => act("/api/live", () => ({ light_percent: light.map(numeric) })));
   const forgetValues = () => { values.length = 0; best = 0; };
   const measure = choice(MEASURES, MEASURES[0][0], (name) => { forgetValues(); act("/api/live", { measure: name }); });
@@ -197,7 +197,7 @@ export function make(host) {
     if (before && String(before.live.region) !== String(live.region)) forgetValues();
     light.forEach((level, at) => {
       level.disabled = !hasControl() || rig.phase !== "ready";
-      if (document.activeElement !== level) level.value = String(Math.round(live.light_percent[at]));
+      if (document.activeElement !== level) level.value = String(Number(live.light_percent[at].toFixed(1))); // the board's resolution
     });
     deep.disabled = !hasControl() || rig.phase !== "ready";
     if (document.activeElement !== exposure) exposure.value = live.exposure_us;
@@ -225,10 +225,10 @@ export function make(host) {
   });
 
   on("image", (header, pixels) => {
+    pictured = performance.now();
     if (host.hidden) return;
     const found = header.figures;
     shown = true;
-    pictured = performance.now();
     image.show(shade(blank(header, reused.image), pixels, saturation.box.checked, peaking.box.checked));
     time(image, header);
     if (tries) meter(header);
@@ -246,12 +246,12 @@ export function make(host) {
   });
 
   on("depth", (header, pixels) => {
+    pictured = performance.now();
     if (host.hidden) return;
     const { width, height, low_mm, high_mm } = header;
     const count = width * height;
     const codes = new Uint16Array(pixels.buffer, pixels.byteOffset, count);
     shown = true;
-    pictured = performance.now();
     live = { codes, width, low_mm, high_mm };
     scale.hidden = false;
     bar(colours, "viridis", [low_mm, high_mm], "mm");

@@ -59,6 +59,15 @@ function go(name, detail, back = false) {
   view.parts?.shown?.(detail);
 }
 
+/** A part of the address; nothing where it is not encoded as one. @param {string} text */
+function decoded(text) {
+  try {
+    return decodeURIComponent(text);
+  } catch {
+    return undefined;
+  }
+}
+
 function tabKeys(event) {
   const names = [...views.keys()];
   const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
@@ -215,7 +224,7 @@ function begin() {
   open();
   const addressed = (back) => {
     const [name, detail] = location.hash.slice(1).split("/");
-    go(name || "live", detail && decodeURIComponent(detail), back);
+    go(name || "live", detail && decoded(detail), back);
   };
   addEventListener("popstate", () => addressed(true));
   addressed(false);

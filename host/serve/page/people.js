@@ -152,7 +152,10 @@ export function shadow() {
   const picture = h("div", { class: "guide-picture wide" }, draw.sun(30, 0, 1.7));
   const facts = h("div", { "aria-live": "polite" });
   const results = h("div", { "aria-live": "polite" });
-  const sunlight = () => ({ lat: numeric(inputs.latitude), lon: numeric(inputs.longitude), time: new Date(time.value).toISOString() });
+  const sunlight = () => {
+    if (!time.value) throw new Error("Time: expected a date and a time, the field is empty");
+    return { lat: numeric(inputs.latitude), lon: numeric(inputs.longitude), time: new Date(time.value).toISOString() };
+  };
   async function shown() {
     if (!time.value) return;
     try {

@@ -1,6 +1,6 @@
 // The rig: how it is, and moving it. Always in reach.
 import { act, call, hasControl, get, on, store } from "./link.js";
-import { h, button, choice, keep, notice, number, rows } from "./ui.js";
+import { h, button, choice, keep, notice, number, numeric, rows } from "./ui.js";
 import { draw, listen } from "./stages.js";
 import { key } from "./keys.js";
 
@@ -64,13 +64,13 @@ function sceneChoice(scene) {
   const flat = FLAT.exec(scene)?.[1];
   const known = flat || SCENES.some(([name]) => name === scene);
   const set = async (to) => {
-    if (await act("/api/rig/scene", { scene: to })) return;
+    if (await act("/api/rig/scene", () => ({ scene: to === "plane" ? `plane:${numeric(distance)}` : to }))) return;
     [chosen.value, distance.value] = [flat ? "plane" : scene, flat ?? USUAL_MM];
   };
   const distance = h("input", { type: "number", min: 1, step: "any", value: flat ?? USUAL_MM, "aria-label": "Distance of the flat target, mm", title: "Distance of the flat target", disabled: !hasControl() });
-  distance.addEventListener("change", () => set(`plane:${distance.value}`));
+  distance.addEventListener("change", () => set("plane"));
   const names = [...(known ? [] : [[scene, scene]]), ...SCENES, ["plane", "Flat target"]];
-  const chosen = choice(names, flat ? "plane" : scene, (name) => set(name === "plane" ? `plane:${distance.value}` : name), { "aria-label": "Scene", title: "Restarts the emulated rig with this scene", disabled: !hasControl() });
+  const chosen = choice(names, flat ? "plane" : scene, set, { "aria-label": "Scene", title: "Restarts the emulated rig with this scene", disabled: !hasControl() });
   return h("div", { class: "row scene-choice" }, h("span", { class: "dim" }, "Scene"), chosen, h("span", { class: "unit", hidden: !flat }, distance, " mm"));
 }
 
@@ -99,11 +99,7 @@ const chosen = { coarse: 100, fine: 1, lens: 100 };
 function axis(name, label, usual) {
   chosen[name] = usual;
   const input = h("input", { type: "number", step: "any", inputmode: "decimal", "aria-label": `${label}: go to, in µm`, placeholder: "µm" });
-  const go = () => {
-    const to_um = Number(input.value);
-    if (input.value === "" || !Number.isFinite(to_um)) return notice("Type a position in µm.", "error");
-    return act("/api/rig/move", { axis: [name], to_um: [to_um] });
-  };
+  const go = () => act("/api/rig/move", () => ({ axis: [name], to_um: [numeric(input)] }));
   input.addEventListener("keydown", (event) => { if (event.key === "Enter") go(); });
   return h("div", { class: "axis" }, h("span", { class: "axis-name" }, label), input,
     button("Go", go, { "data-needs": "control", "aria-label": `${label}: go` }),

@@ -27,11 +27,14 @@ export function make(host, open) {
   const wanted = (capture) => !kinds.value || kinds.value === capture.kind || (kinds.value === "depth" && capture.has_depth) || (kinds.value === "rated" && capture.note.rating > 0);
   let waiting = 0;
   let shown = [];
+  let newest = 0;
   search.addEventListener("input", () => { clearTimeout(waiting); waiting = setTimeout(refresh, 200); });
 
   async function refresh() {
+    const asked = ++newest;
     try {
       const { captures } = await get(`/api/captures?search=${encodeURIComponent(search.value)}`);
+      if (asked !== newest) return; // a later search is on the way
       count.textContent = captures.length === 1 ? "1 capture" : `${captures.length} captures`;
       shown = captures.filter(wanted).sort((a, b) => b.written_unix_s - a.written_unix_s || b.name.localeCompare(a.name));
       list.replaceChildren(...shown.map((capture) => card(capture, open, refresh)));
@@ -52,13 +55,15 @@ export function make(host, open) {
 /** `changed` is called after a capture was renamed or deleted. */
 function card(capture, open, changed) {
   const file = capture.has_depth ? "view.png" : capture.images[0];
+  // A browser shows a picture that it has again, unless the address changes.
+  const picture = `files/${encodeURIComponent(file)}?${store.state?.captures ?? 0}`;
   const path = `/api/captures/${encodeURIComponent(capture.name)}`;
   const focus = capture.optics?.focus;
   const kind = capture.kind === "pair" ? "pair" : capture.images.length === 1 ? "still" : "stack";
   const facts = [kind, `${capture.width} × ${capture.height}`, `${capture.exposure_us} µs`, focus && `far ${number(focus.far_mm, 0)} mm`, capture.scene && `scene ${capture.scene}`, capture.time ?? (capture.written_unix_s && new Date(1000 * capture.written_unix_s).toLocaleString())];
   return h("li", { class: "capture-card" },
     h("button", { type: "button", class: "thumbnail", onclick: () => open(capture.name), "aria-label": `Open ${capture.name}` },
-      capture.broken ? h("span", { class: "bad" }, "broken") : h("img", { src: `${path}/files/${encodeURIComponent(file)}`, alt: "", loading: "lazy" })),
+      capture.broken ? h("span", { class: "bad" }, "broken") : h("img", { src: `${path}/${picture}`, alt: "", loading: "lazy" })),
     h("div", { class: "capture-words" }, h("h3", {}, capture.name), h("p", { class: "dim" }, capture.broken ?? facts.filter(Boolean).join(" · ")),
       stars(capture), note(capture)),
     h("div", { class: "buttons" }, h("a", { class: "button", href: `${path}/report.html`, target: "_blank", rel: "noopener" }, "Report"),

@@ -46,5 +46,5 @@ export interface State {
 export interface Hello {
   client: number;
   secret: string;
-  version: string;
+  server: string;
 }

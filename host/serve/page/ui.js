@@ -118,10 +118,13 @@ export function ask(question, { text = false, yes = "Continue", no = "Cancel", s
   });
 }
 
+/** Whether an input has another text than was typed. A value that the page has set since then is right. @param {HTMLInputElement} input */
+export const altered = (input) => input.dataset.typed !== undefined && input.dataset.typed === input.value;
+
 /** The number in an input; null where it is empty. The browser gives an empty value also for a text that is not a number: only `badInput` differs.
  * @param {HTMLInputElement} input @returns {number | null} */
 export function optional(input) {
-  if (input.validity.badInput) throw new Error(`${nameOf(input)}: expected a number`);
+  if (input.validity.badInput || altered(input)) throw new Error(`${nameOf(input)}: expected a number`);
   return input.value === "" ? null : Number(input.value);
 }
 

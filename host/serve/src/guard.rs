@@ -20,6 +20,7 @@ use crate::app::lock;
 const SHORTEST: usize = 16;
 const LONGEST: usize = 256;
 const GUESS: Duration = Duration::from_secs(1);
+/// Begins the cookie's name, which ends with the port: a browser sends a host's cookies to all of its ports.
 const COOKIE: &str = "farnear-token";
 
 #[derive(Debug)]
@@ -87,6 +88,8 @@ impl Token {
 pub struct Guard {
     token: Option<Token>,
     names: Vec<String>,
+    /// Port of the page.
+    port: u16,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
@@ -102,11 +105,12 @@ pub enum Refused {
 }
 
 impl Guard {
-    pub fn new(listen: &Listen) -> Self {
+    /// `port` is the one that the system has bound.
+    pub fn new(listen: &Listen, port: u16) -> Self {
         match listen {
-            Listen::Loopback { .. } => Self::default(),
+            Listen::Loopback { .. } => Self { port, ..Self::default() },
             Listen::Network { token, names, .. } => {
-                Self { token: Some(Token(token.0.clone())), names: names.clone() }
+                Self { token: Some(Token(token.0.clone())), names: names.clone(), port }
             }
         }
     }
@@ -134,27 +138,31 @@ impl Guard {
         let text = |name| headers.get_all(name).iter().filter_map(|value| value.to_str().ok());
         let bearer = text(header::AUTHORIZATION).filter_map(|value| value.strip_prefix("Bearer "));
         let cookies = text(header::COOKIE).flat_map(|value| value.split(';'));
-        let cookie = cookies.filter_map(|pair| pair.trim().strip_prefix(COOKIE)?.strip_prefix('='));
+        let cookie = cookies.filter_map(|pair| Some(pair.trim().strip_prefix(COOKIE)?.split_once('=')?.1));
         if bearer.chain(cookie).any(|given| token.is(given)) { Ok(()) } else { Err(Refused::Token) }
     }
 
-    pub fn has_token(headers: &HeaderMap) -> bool {
+    pub fn has_token(&self, headers: &HeaderMap) -> bool {
+        let own = format!("{COOKIE}-{}", self.port);
+        let is_ours =
+            |pair: &str| pair.trim().split_once('=').is_some_and(|(name, _)| name == COOKIE || name == own);
         let cookie = headers.get_all(header::COOKIE).iter().filter_map(|value| value.to_str().ok());
-        headers.contains_key(header::AUTHORIZATION)
-            || cookie.flat_map(|value| value.split(';')).any(|pair| pair.trim().starts_with(COOKIE))
+        headers.contains_key(header::AUTHORIZATION) || cookie.flat_map(|value| value.split(';')).any(is_ours)
     }
 
     /// The cookie for a correct token.
     pub fn cookie(&self, typed: &str) -> Option<String> {
         let known = self.token.as_ref().is_some_and(|token| token.is(typed));
-        known.then(|| format!("{COOKIE}={typed}; HttpOnly; SameSite=Strict; Path=/"))
+        known.then(|| format!("{COOKIE}-{}={typed}; HttpOnly; SameSite=Strict; Path=/", self.port))
     }
 
     /// Whether this host, with or without a port, is this computer.
     fn is_ours(&self, host: &str) -> bool {
+        // A browser sends names in lower case, however they were typed.
+        let host = host.to_ascii_lowercase();
         let name = match host.rsplit_once(':') {
             Some((name, port)) if port.bytes().all(|b| b.is_ascii_digit()) && !name.ends_with(':') => name,
-            _ => host,
+            _ => host.as_str(),
         };
         let bare = name.trim_start_matches('[').trim_end_matches(']');
         let address = bare.parse::<IpAddr>().ok();
@@ -166,7 +174,7 @@ impl Guard {
         self.token.is_some()
             && (address.is_some()
                 || (local && !name.is_empty())
-                || self.names.iter().any(|known| known == name))
+                || self.names.iter().any(|known| known.eq_ignore_ascii_case(name)))
     }
 }
 
@@ -214,8 +222,8 @@ mod tests {
     }
 
     fn network() -> Guard {
-        let names = vec!["rig.lab.example".into()];
-        Guard { token: Token::new(SECRET), names }
+        let names = vec!["Rig.lab.example".into()];
+        Guard { token: Token::new(SECRET), names, port: 8080 }
     }
 
     #[test]
@@ -244,7 +252,7 @@ mod tests {
         let guard = network();
         let asked = |host: &str| guard.check_names(&Uri::default(), &headers(&[("host", host)]));
         for host in
-            ["192.168.0.7:8080", "[fe80::1]:8080", "rig:8080", "rig.local", "rig.lab.example:80", "localhost"]
+            ["192.168.0.7:8080", "[fe80::1]:8080", "rig:8080", "RIG.local", "rig.lab.example:80", "localhost"]
         {
             assert_eq!(asked(host), Ok(()), "{host}");
         }
@@ -287,6 +295,17 @@ mod tests {
     }
 
     #[test]
+    fn servers_at_two_ports_of_a_host_keep_their_cookies() {
+        let guard = network();
+        let own = guard.cookie(SECRET).unwrap();
+        assert!(own.starts_with(&format!("farnear-token-8080={SECRET};")), "{own}");
+        for cookies in ["farnear-token-8081=other; farnear-token-8080=", "farnear-token-8081="] {
+            let sent = headers(&[("cookie", &format!("{cookies}{SECRET}"))]);
+            assert_eq!(guard.check_token(&sent), Ok(()), "{cookies}");
+        }
+    }
+
+    #[test]
     fn doubled_headers_and_other_names_in_the_request_line_are_refused() {
         let guard = Guard::default();
         for name in ["host", "origin"] {
@@ -315,10 +334,11 @@ mod tests {
         for (name, value, sent) in [
             ("authorization", "Bearer 0123", true),
             ("cookie", "a=b; farnear-token=0123", true),
+            ("cookie", "farnear-token-1=0123", false),
             ("cookie", "a=b; c=d", false),
             ("accept", "farnear-token=0123", false),
         ] {
-            assert_eq!(Guard::has_token(&headers(&[(name, value)])), sent, "{name}: {value}");
+            assert_eq!(network().has_token(&headers(&[(name, value)])), sent, "{name}: {value}");
         }
     }
 

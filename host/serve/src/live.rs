@@ -198,7 +198,7 @@ pub(crate) mod tests {
             light: None,
         };
         let listen = Listen::Loopback { port: 0 };
-        let guard = Guard::new(&listen);
+        let guard = Guard::new(&listen, 0);
         let limits = Limits::default();
         let settings =
             ServeSettings { rig: None, camera, session: folder.into(), optics: None, listen, limits };

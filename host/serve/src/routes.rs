@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 use axum::{
     Json, Router,
-    body::Bytes,
+    body::{Bytes, to_bytes},
     extract::{ConnectInfo, DefaultBodyLimit, FromRequest, MatchedPath, Request, State},
     http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header},
     middleware::{Next, from_fn},
@@ -31,7 +31,7 @@ use crate::{
     assets,
     connections::{Connection, Peer},
     failure::Failure,
-    guard::{Guard, Refused},
+    guard::Refused,
 };
 
 const BODY_MAX: usize = 256 * 1024;
@@ -99,7 +99,7 @@ async fn guarded(app: Arc<App>, access: Arc<Access>, request: Request, next: Nex
             Ok(()) => next.run(request).await,
             Err(failure) => failure.into_response(),
         },
-        Err(Refused::Token) if Guard::has_token(headers) && !delayed(&app, peer.as_deref()).await => {
+        Err(Refused::Token) if app.guard.has_token(headers) && !delayed(&app, peer.as_deref()).await => {
             too_many()
         }
         Err(Refused::Token) if request.uri().path() == "/" => assets::login_page(),
@@ -108,6 +108,7 @@ async fn guarded(app: Arc<App>, access: Arc<Access>, request: Request, next: Nex
         }
         Err(refused) => Failure::new(StatusCode::FORBIDDEN, refused.to_string()).into_response(),
     };
+    response = as_json(response).await;
     if let Some(peer) = &peer {
         match response.status() {
             StatusCode::SWITCHING_PROTOCOLS => peer.upgrade(),
@@ -120,6 +121,18 @@ async fn guarded(app: Arc<App>, access: Arc<Access>, request: Request, next: Nex
     headers.insert(RESOURCE_POLICY, HeaderValue::from_static("same-origin"));
     headers.insert(header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
     response
+}
+
+/// An error of axum is plain text; the page and programs read JSON.
+async fn as_json(response: Response) -> Response {
+    let status = response.status();
+    let media = response.headers().get(header::CONTENT_TYPE);
+    let is_text = media.is_some_and(|media| media.as_bytes().starts_with(b"text/plain"));
+    if !is_text || !(status.is_client_error() || status.is_server_error()) {
+        return response;
+    }
+    let text = to_bytes(response.into_body(), BODY_MAX).await.unwrap_or_default();
+    Failure::new(status, String::from_utf8_lossy(&text)).into_response()
 }
 
 /// Checked before the body is read.

@@ -69,7 +69,7 @@ pub fn serve(
     let failed = |source| ServeError::Listen { address, source };
     let listener = runtime.block_on(tokio::net::TcpListener::bind(address)).map_err(failed)?;
     let bound = listener.local_addr()?;
-    let guard = Guard::new(&settings.listen);
+    let guard = Guard::new(&settings.listen, bound.port());
     let _lock = session_lock::lock(&settings.session)?;
     let app = App::new(settings, guard)?;
     let workers = job_queue::start(&app)?;

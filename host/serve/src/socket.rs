@@ -21,6 +21,8 @@ use crate::{app::App, control::RESERVED, routes::Shared, view::Hello};
 
 /// Interval between pings to the browser.
 const ASK: Duration = Duration::from_secs(1);
+/// Interval between messages without content: a page does not see pings, and must notice that the server has vanished.
+const HERE: Duration = Duration::from_secs(2);
 /// Longest silence: a browser answers pings even while its page is busy.
 const SILENCE: Duration = Duration::from_secs(5);
 /// Pictures without acknowledgement: on display and in transit. More would delay the display by seconds.
@@ -89,6 +91,8 @@ async fn talk(sink: &mut SplitSink<WebSocket, Message>, stream: &mut SplitStream
     let (mut state, mut pictures) = (app.follow(), app.pictures.subscribe());
     let mut ask = interval(ASK);
     ask.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut here = interval(HERE);
+    here.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut browser = Browser { heard: Instant::now(), on_the_way: 0, wrong: None };
     let mut pictured = Instant::now();
     loop {
@@ -114,6 +118,7 @@ async fn talk(sink: &mut SplitSink<WebSocket, Message>, stream: &mut SplitStream
                         pictured = Instant::now();
                         Message::Binary(pictures.borrow_and_update().clone())
                     }
+                    _ = here.tick() => Message::text(r#"{"type":"here"}"#),
                     _ = ask.tick() => {
                         if browser.heard.elapsed() > SILENCE {
                             return;

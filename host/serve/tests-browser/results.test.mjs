@@ -328,3 +328,159 @@ test("layers stay in use while the files of the shown capture are loaded again",
   await page.locator("button[data-layer=reason]:disabled").waitFor();
   await page.context().close();
 });
+
+test("a number with a comma or with the page's own minus is refused, not changed", async () => {
+  const page = await open(browser, server.address);
+  const lens = page.getByLabel("Lens: go to, in µm");
+  const go = page.getByRole("button", { name: "Lens: go", exact: true });
+  await lens.pressSequentially("12,5");
+  await page.locator(".notice", { hasText: "expected a number with a decimal point" }).waitFor();
+  await go.click();
+  await page.locator(".notice.error", { hasText: "Lens: go to, in µm: expected a number" }).waitFor();
+  assert.equal((await server.ask("/api/state")).job?.kind === "move", false);
+  await lens.press("Backspace");
+  await lens.pressSequentially(".5");
+  assert.deepEqual([await lens.inputValue(), await lens.getAttribute("aria-invalid")], ["12.5", null]);
+  await lens.fill("");
+  await page.keyboard.insertText("−12.5");
+  assert.deepEqual([await lens.inputValue(), await lens.getAttribute("aria-invalid")], ["", "true"]);
+});
+
+test("a light keeps its tenths when the other one is changed", async () => {
+  const page = await open(browser, server.address);
+  await page.evaluate(async () => (await import("/link.js")).act("/api/live", { light_percent: [0.4, 0] }));
+  await page.waitForFunction(() => document.querySelector("input[title^='Light output']").value === "0.4");
+  const light = page.getByLabel("Light 2", { exact: true });
+  await light.fill("50");
+  await light.press("Tab");
+  for (let now; now?.[1] !== 50; now = (await server.ask("/api/state")).live.light_percent) if (now) assert.equal(now[0], 0.4);
+  assert.deepEqual((await server.ask("/api/state")).live.light_percent, [0.4, 50]);
+  await page.evaluate(async () => (await import("/link.js")).act("/api/live", { light_percent: [0, 0] }));
+});
+
+test("all options of a stack are offered", async () => {
+  const page = await open(browser, `${server.address}#depth/stack-001`);
+  const panel = page.locator("section.panel", { hasText: "Depth from focus" });
+  await panel.getByText("All options").click();
+  await panel.getByLabel("smoothing px").waitFor();
+  assert.deepEqual(page.complaints, []);
+});
+
+test("a capture with a colon in its name is compared under this name", async () => {
+  for (const name of ["pair-colon", "pair-colon:2"]) copy(name, /^$/);
+  const page = await depthOfPair();
+  await page.locator("#tab-live").click();
+  await page.locator("#tab-depth").click();
+  const map = page.waitForRequest((request) => request.url().endsWith("/depth.npy"));
+  await page.getByLabel("Compare with").selectOption("depth:pair-colon:2");
+  assert.match((await map).url(), /\/pair-colon%3A2\/files/);
+  for (const name of ["pair-colon", "pair-colon:2"]) rmSync(join(server.session, name), { recursive: true });
+});
+
+test("the maps of a capture that is renamed are not shown under another name", async () => {
+  copy("pair-zz", /^$/);
+  const page = await open(browser, `${server.address}#depth/pair-zz`);
+  await page.locator("canvas[data-layer=depth]").waitFor();
+  await page.waitForLoadState("networkidle");
+  const map = page.waitForRequest((request) => request.url().endsWith("/pair-zzz/files/depth.npy"));
+  await page.evaluate(async () => (await import("/link.js")).act("/api/captures/pair-zz/rename", { name: "pair-zzz" }));
+  await map;
+  await page.locator("canvas[data-layer=depth]").waitFor();
+  assert.equal(await page.getByLabel("Capture", { exact: true }).inputValue(), "pair-zzz");
+  rmSync(join(server.session, "pair-zzz"), { recursive: true });
+});
+
+test("a map that cannot be loaded again is not left as the new one", async () => {
+  const page = await depthOfPair();
+  await page.route("**/files/depth.npy", (route) => route.abort());
+  await page.getByRole("button", { name: "Compute depth", exact: true }).click();
+  await page.locator("button[data-layer=depth]:disabled").waitFor();
+  assert.equal(await page.locator("canvas[data-layer]").count(), 0);
+  await page.unroute("**/files/depth.npy");
+  await page.locator("#tab-captures").click();
+  await page.getByRole("button", { name: "Open pair-001" }).click();
+  await page.locator("canvas[data-layer=depth]").waitFor();
+});
+
+test("optics are used as they are typed, however late the answers come", async () => {
+  const page = await open(browser, `${server.address}#optics`);
+  await page.locator(".to-scale").waitFor();
+  const { optics: before } = await server.ask("/api/optics");
+  const delays = [1500, 0];
+  await page.route("**/api/optics/calculate", async (route) => {
+    await new Promise((done) => setTimeout(done, delays.shift() ?? 0));
+    await route.continue();
+  });
+  const far = page.getByLabel("Far focus", { exact: true });
+  const asked = page.waitForRequest((request) => request.url().endsWith("/calculate"));
+  await far.fill("950");
+  await asked;
+  await far.fill("920");
+  await page.getByRole("button", { name: "Use these optics" }).click();
+  await page.getByText("In use for captures from now on.").waitFor();
+  assert.equal((await server.ask("/api/optics")).optics.focus.far_mm, 920);
+  await page.waitForTimeout(1500);
+  assert.equal(await page.locator(".to-scale text", { hasText: "920.0 mm" }).count(), 1);
+  await page.evaluate(async (optics) => (await import("/link.js")).act("/api/optics", { optics }, "PUT"), before);
+});
+
+test("the list of captures is that of the last search, with the pictures of now", async () => {
+  const page = await open(browser, `${server.address}#captures`);
+  const names = page.locator(".capture-card h3");
+  await names.first().waitFor();
+  await page.route("**/api/captures?search=s", async (route) => { await new Promise((done) => setTimeout(done, 1000)); await route.continue(); });
+  const search = page.getByLabel("Search captures");
+  const asked = page.waitForRequest((request) => request.url().endsWith("search=s"));
+  await search.fill("s");
+  await asked;
+  await search.fill("pair-001");
+  await page.waitForTimeout(1500);
+  assert.deepEqual(await names.allTextContents(), ["pair-001"]);
+  const picture = page.waitForRequest((request) => request.url().includes("/pair-001/files/view.png"));
+  await page.evaluate(async () => (await import("/link.js")).act("/api/captures/pair-001/depth", { method: "subbarao" }));
+  await picture;
+  await page.unrouteAll({ behavior: "wait" });
+});
+
+test("a duplicated tab watches", async () => {
+  const page = await open(browser, server.address);
+  const [twin] = await Promise.all([page.context().waitForEvent("page"), page.evaluate(() => { window.open(location.href); })]);
+  await twin.getByText("another browser has control").waitFor();
+  assert.match(await page.locator("#who").textContent(), /you have control/);
+});
+
+test("an address that is not encoded as one opens its view", async () => {
+  const page = await open(browser, `${server.address}#log/%ff`);
+  await page.locator("#view-log").waitFor();
+  assert.deepEqual(page.complaints, []);
+});
+
+test("the login tells why a token is refused", async () => {
+  const page = await (await browser.newContext()).newPage();
+  await page.route("**/login", (route) => route.fulfill({ status: 429, json: { error: "too many wrong tokens" } }));
+  await page.goto(`${server.address}login.html`);
+  await page.getByLabel("Token").fill("0123456789abcdef");
+  await page.getByRole("button", { name: "Open" }).click();
+  await page.getByText("too many wrong tokens").waitFor();
+  await page.unroute("**/login");
+  await page.route("**/login", (route) => route.abort());
+  await page.getByRole("button", { name: "Open" }).click();
+  await page.getByText("farnear does not answer").waitFor();
+});
+
+test("a server that vanishes is reported, and a stop that it does not answer", async () => {
+  const silent = await serve();
+  const page = await open(browser, silent.address);
+  try {
+    process.kill(silent.pid, "SIGSTOP");
+    await page.locator("#stop").click();
+    await page.getByText("farnear has not answered the stop.").waitFor({ timeout: 5000 });
+    await page.locator("#link", { hasText: "no connection" }).waitFor({ timeout: 20_000 });
+    process.kill(silent.pid, "SIGCONT");
+    await page.locator("#link[data-phase=ready]").waitFor();
+  } finally {
+    process.kill(silent.pid, "SIGCONT");
+    await page.context().close();
+    await silent.close();
+  }
+});

@@ -21,7 +21,7 @@ after(async () => {
 
 /** Posts as this page would, with its secret. */
 const post = (page, path, body = {}) => page.evaluate(async ([path, body]) => {
-  const secret = sessionStorage.getItem("farnear-client");
+  const { secret } = (await import("/link.js")).store.client;
   const answer = await fetch(path, { method: "POST", headers: { "content-type": "application/json", "x-farnear-client": secret }, body: JSON.stringify(body) });
   return { status: answer.status, ...(await answer.json()) };
 }, [path, body]);
@@ -228,7 +228,7 @@ test("the depth of a whole series is computed from the captures", async () => {
   await page.getByLabel("Show", { exact: true }).selectOption("pair");
   await page.locator(".capture-card", { hasText: begun.names[1] }).waitFor();
   await page.getByRole("button", { name: "Compute depth of all" }).click();
-  await page.waitForFunction((names) => names.every((name) => document.querySelector(`.capture-card img[src="/api/captures/${name}/files/view.png"]`)), begun.names);
+  await page.waitForFunction((names) => names.every((name) => document.querySelector(`.capture-card img[src^="/api/captures/${name}/files/view.png?"]`)), begun.names);
   await page.getByRole("button", { name: "Compute depth of all" }).click();
   await page.locator(".notice", { hasText: "No pair without a depth is shown here." }).waitFor();
   assert.deepEqual(page.complaints, []);

@@ -192,7 +192,7 @@ fn thesis(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow, 
     if (shadow.eta_rad - FRAC_PI_2).abs() < VERTICAL_RAD {
         let bottom = outline.bounds.1 as f64;
         let limit = -(bottom - shadow.m_px[1].max(0.0)) as f32;
-        clear_left_of(mask.view(), out, FRAC_PI_2 as f32, limit, false);
+        clear_left_of(out, FRAC_PI_2 as f32, limit, false);
         return Edge { beta_rad: FRAC_PI_2, limit: Some(limit), half_plane: true };
     }
     let flip = shadow.mirrored.then_some(mask.ncols() as f32);
@@ -203,7 +203,7 @@ fn thesis(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow, 
     let Some((beta_rad, limit)) = longest_run(outline, flip, angles) else {
         return Edge { beta_rad: shadow.beta_rad, limit: None, half_plane: false };
     };
-    clear_left_of(mask.view(), out, beta_rad as f32, limit, shadow.mirrored);
+    clear_left_of(out, beta_rad as f32, limit, shadow.mirrored);
     Edge { beta_rad, limit: Some(limit), half_plane: false }
 }
 
@@ -234,7 +234,7 @@ fn clear_sideways(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &Image
     }
     let flip = shadow.mirrored.then_some(mask.ncols() as f32);
     let (beta_rad, limit) = longest_run(outline, flip, degrees_about(shadow.beta_rad))?;
-    let gone = clear_left_of(mask.view(), out, beta_rad as f32, limit, shadow.mirrored);
+    let gone = clear_left_of(out, beta_rad as f32, limit, shadow.mirrored);
     if gone as f64 > 0.6 * outline.area as f64 {
         out.assign(mask);
         return None;
@@ -293,7 +293,7 @@ fn half_plane(mask: &Mask, out: &mut Mask, shadow: &ImageShadow) -> Edge {
     let (sin, cos) = shadow.beta_rad.sin_cos();
     let x = if shadow.mirrored { mask.ncols() as f64 - 1.0 - shadow.foot_px[0] } else { shadow.foot_px[0] };
     let limit = (x * cos - shadow.foot_px[1] * sin) as f32;
-    clear_left_of(mask.view(), out, shadow.beta_rad as f32, limit, shadow.mirrored);
+    clear_left_of(out, shadow.beta_rad as f32, limit, shadow.mirrored);
     Edge { beta_rad: shadow.beta_rad, limit: Some(limit), half_plane: true }
 }
 

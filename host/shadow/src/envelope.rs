@@ -3,7 +3,6 @@
 //! 2014, eq. 8.38) in one pass over the outline per angle.
 
 use farnear_silhouettes::mask::Mask;
-use ndarray::ArrayView2;
 
 /// Outline pixels (set, next to an unset 4-neighbour or the border) and row extents.
 #[derive(Clone, Debug)]
@@ -104,16 +103,10 @@ impl LowerEdge {
     }
 }
 
-/// Clears pixels with `x cos b - y sin b < limit` in `out` and returns their number; `view` is the input.
-pub fn clear_left_of(
-    view: ArrayView2<bool>,
-    out: &mut Mask,
-    angle_rad: f32,
-    limit: f32,
-    flip: bool,
-) -> usize {
+/// Clears pixels with `x cos b - y sin b < limit` in `out` and returns their number.
+pub fn clear_left_of(out: &mut Mask, angle_rad: f32, limit: f32, flip: bool) -> usize {
     let (sin, cos) = angle_rad.sin_cos();
-    let width = view.ncols();
+    let width = out.ncols();
     let mut cleared = 0;
     for (y, mut row) in out.rows_mut().into_iter().enumerate() {
         let Some(row) = row.as_slice_mut() else { continue };
@@ -189,18 +182,17 @@ mod tests {
             let (flipped, expected) = (plain.lower_edge(angle, Some(12.0)), other.lower_edge(angle, None));
             assert_eq!((flipped.origin, flipped.edge), (expected.origin, expected.edge));
             let [mut left, mut of_mirrored] = [mask.clone(), mirrored.clone()];
-            let cleared = clear_left_of(mask.view(), &mut left, angle, 1.5, true);
-            assert_eq!(cleared, clear_left_of(mirrored.view(), &mut of_mirrored, angle, 1.5, false));
+            let cleared = clear_left_of(&mut left, angle, 1.5, true);
+            assert_eq!(cleared, clear_left_of(&mut of_mirrored, angle, 1.5, false));
             assert_eq!(left, Mask::from_shape_fn(mask.dim(), |(y, x)| of_mirrored[[y, 11 - x]]));
         }
     }
 
     #[test]
     fn what_is_left_of_a_rotated_limit_is_cleared() {
-        let full = Mask::from_elem((6, 8), true);
-        let mut left = full.clone();
+        let mut left = Mask::from_elem((6, 8), true);
         let (angle, limit) = (0.5_f32, 1.0);
-        let cleared = clear_left_of(full.view(), &mut left, angle, limit, false);
+        let cleared = clear_left_of(&mut left, angle, limit, false);
         for ((y, x), left) in left.indexed_iter() {
             assert_eq!(*left, x as f32 * angle.cos() - y as f32 * angle.sin() >= limit, "{x}, {y}");
         }

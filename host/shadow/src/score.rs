@@ -105,12 +105,6 @@ impl ShadowScore {
         percent(self.subject_removed, self.subject_pixels)
     }
 
-    /// Discrimination rate (Sanin et al. 2012, section 4): subject pixels kept.
-    #[must_use]
-    pub fn discrimination_percent(&self) -> Option<f64> {
-        self.wrongly_removed_percent().map(|wrong| 100.0 - wrong)
-    }
-
     #[must_use]
     pub fn iou_percent(&self) -> Option<f64> {
         percent(self.intersection, self.union)
@@ -159,7 +153,7 @@ mod tests {
             .add(None, Array2::from_elem((2, 2), false).view(), Array2::from_elem((2, 2), B).view())
             .unwrap();
         assert_eq!(score.removed_percent(), None);
-        assert_eq!(score.discrimination_percent(), None);
+        assert_eq!(score.wrongly_removed_percent(), None);
         assert_eq!(score.iou_percent(), None);
     }
 

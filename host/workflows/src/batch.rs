@@ -185,6 +185,9 @@ pub fn run(
     let total = settings.shard.share(outs.jobs());
     let failures = settings.failures.clone().unwrap_or_else(|| failures_file(settings));
     outs.check_report("failures", &failures, Tally::begins)?;
+    if settings.failures.is_some() && !settings.dry_run {
+        prepare_report("failures", &failures)?;
+    }
     let table = summary_file(settings);
     if let Some(path) = &table {
         outs.check_report("summary", path, Summary::begins)?;
@@ -192,11 +195,7 @@ pub fn run(
             let reason = "the failures are written there".into();
             return Err(BatchError::Report { what: "summary", path: path.clone(), reason }.into());
         }
-        if let Some(folder) = path.parent() {
-            let unwritable = |source| BatchError::Write { path: path.clone(), source };
-            fs::create_dir_all(folder).map_err(unwritable)?;
-        }
-        check_folder("summary", path)?;
+        prepare_report("summary", path)?;
     }
     let summary = Mutex::new(Summary::default());
     let on_job = |report: &JobReport| {
@@ -238,6 +237,14 @@ pub fn run(
         return Err(BatchError::Failed { failed, jobs, failures }.into());
     }
     Ok(figures)
+}
+
+/// Creates the folder of a report. Checks before the jobs that the report can be written.
+fn prepare_report(what: &'static str, path: &Path) -> Result<()> {
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder).map_err(|source| BatchError::Write { path: path.into(), source })?;
+    }
+    check_folder(what, path)
 }
 
 fn failures_file(settings: &BatchSettings) -> PathBuf {
@@ -334,12 +341,12 @@ impl Work<'_> {
         let ours = refused.is_none();
         let ended = match unreadable.or(refused) {
             Some(error) => Err(error.into()),
-            None => self.job(line, &kind, &fields, &context),
+            None => self.job(line, &kind, &fields, &context, &warnings),
         };
         let (state, figures, error) = match ended {
             Ok((state, figures)) => (state, figures, None),
-            // The next run does it.
-            Err(error) if error.is_cancelled() => return Ok(()),
+            // The next run does it. A job may also fail because the same Ctrl-C ended its ffmpeg.
+            Err(error) if error.is_cancelled() || self.cancel.is_cancelled() => return Ok(()),
             Err(error) => {
                 if ours && !is_in_use(&error) && !self.settings.dry_run {
                     self.discard(&kind, out.as_deref());
@@ -348,7 +355,7 @@ impl Work<'_> {
             }
         };
         let seconds = rounded(start.elapsed().as_secs_f64(), 6);
-        let mut warnings = warnings.0.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let mut warnings = warnings.all();
         // Report warnings once.
         if figures.as_ref().is_some_and(|figures| figures.get("warnings").is_some()) {
             warnings.clear();
@@ -369,6 +376,7 @@ impl Work<'_> {
         kind: &str,
         fields: &Fields,
         context: &Context<'_>,
+        warnings: &Warnings,
     ) -> Result<(State, Option<Value>)> {
         let kind = jobs::kind(kind)?;
         jobs::check_outputs(kind, fields)?;
@@ -392,10 +400,13 @@ impl Work<'_> {
         let wanted = Provenance::new(kind.name, fields, input);
         let place = Place::new(out, makes_file(kind));
         match place.look(&wanted, self.settings.verify)? {
-            Found::Done(figures) => Ok((State::Already, figures)),
+            Found::Done(figures, earlier) => {
+                earlier.iter().for_each(|warning| warnings.warn(warning));
+                Ok((State::Already, figures))
+            }
             Found::ToDo if self.settings.dry_run => Ok((State::Todo, None)),
             Found::ToDo => {
-                let figures = place.fill(wanted, |out| work.run(out, context))?;
+                let figures = place.fill(wanted, |out| work.run(out, context), || warnings.all())?;
                 Ok((State::Done, Some(figures)))
             }
         }
@@ -415,6 +426,12 @@ fn makes_file(task: &Task) -> bool {
 /// Collects a job's warnings; discards steps and counts.
 #[derive(Default)]
 struct Warnings(Mutex<Vec<String>>);
+
+impl Warnings {
+    fn all(&self) -> Vec<String> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
 
 impl Progress for Warnings {
     fn info(&self, _: &str) {}

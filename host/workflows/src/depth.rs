@@ -7,6 +7,7 @@ mod pair;
 pub mod part;
 mod record;
 mod request;
+pub mod tone;
 
 use std::{sync::Arc, time::Instant};
 
@@ -200,6 +201,7 @@ impl Inputs {
         )
         .about(|| format!("{} and {}", settings.far.display(), settings.near.display()))?;
         cancel("computing depth")?;
+        let curved = tone::doubt(&found.prepared.far, &found.prepared.near);
         let (mut map, Validity { mut reasons, mut lost, deviation_mm, .. }) = (found.map, found.validity);
         let mut deviation = settings
             .uncertainty
@@ -228,6 +230,7 @@ impl Inputs {
         }
         let mut findings: Vec<String> = self.doubts.iter().map(ToString::to_string).collect();
         findings.extend(found.findings.iter().map(ToString::to_string));
+        findings.extend(curved);
         let beyond = |lost: &&Lost| lost.reason == Reason::BeyondCorrection && lost.fraction > LEAST_REPORTED;
         findings.extend(lost.iter().find(beyond).map(|lost| Finding::Lost(*lost).to_string()));
         if !found.findings.iter().any(Finding::is_swapped) {

@@ -18,6 +18,7 @@ use serde::Deserialize;
 use crate::{
     context::{Cancel, Context},
     error::Result,
+    request::outputs::check_inputs,
 };
 
 const PROGRAM: &str = "farnear-sim";
@@ -112,6 +113,11 @@ struct Address {
 impl Simulator {
     /// Starts the simulator and reports it. Default optics: a 50 mm lens.
     pub fn start(scenery: &Scenery, optics: Option<(&Path, Psf)>, context: &Context<'_>) -> Result<Self> {
+        let files = [optics.map(|(file, _)| file), scenery.firmware.as_deref(), scenery.faults.as_deref()];
+        if let Some(trace) = &scenery.trace {
+            let inputs: Vec<PathBuf> = files.into_iter().flatten().map(Path::to_path_buf).collect();
+            check_inputs("trace", trace, &inputs)?;
+        }
         let program = find()?;
         context.info(&format!("starting the emulated rig ({PROGRAM}): no hardware is involved"));
         let mut command = Command::new(&program);
@@ -119,10 +125,11 @@ impl Simulator {
         let scene = if scenery.packed_scene.is_some() { "-" } else { record.scene.as_str() };
         command.args(["run", "--scene", scene, "--psf", &record.psf, "--noise", &record.noise]);
         command.args(["--seed", &record.seed.to_string()]);
+        let [optics, firmware, faults] = files;
         for (flag, file) in [
-            ("--optics", optics.map(|(file, _)| file)),
-            ("--firmware", scenery.firmware.as_deref()),
-            ("--faults", scenery.faults.as_deref()),
+            ("--optics", optics),
+            ("--firmware", firmware),
+            ("--faults", faults),
             ("--trace", scenery.trace.as_deref()),
         ] {
             if let Some(file) = file {
@@ -234,4 +241,23 @@ pub(crate) fn find_program(program: &'static str) -> Result<PathBuf, SimulatorEr
 /// The simulator's default firmware: FARNEAR_FIRMWARE, else the file next to it.
 pub(crate) fn firmware_of(program: &Path) -> PathBuf {
     std::env::var_os("FARNEAR_FIRMWARE").map_or_else(|| program.with_file_name(FIRMWARE), PathBuf::from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_trace_does_not_replace_the_optics() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("rig.toml");
+        std::fs::write(&file, "").expect("a writable folder");
+        let trace = Some(folder.path().join("./rig.toml"));
+        for (optics, faults) in [(Some((file.as_path(), USUAL_PSF)), None), (None, Some(file.clone()))] {
+            let scenery = Scenery { faults, trace: trace.clone(), ..Scenery::default() };
+            let started = Simulator::start(&scenery, optics, &Context::unattended());
+            let error = started.err().expect("refused");
+            assert!(error.is_usage() && error.to_string().contains("would replace the input"), "{error}");
+        }
+    }
 }

@@ -1,5 +1,5 @@
-//! Shared by tests: damaged texts ([`damaged`]), and optional resources: real data, programs, and the emulated
-//! rig. Tests without their resource count as skipped. The crate's build script calls [`declare`], which sets the
+//! Shared by tests: damaged texts ([`damaged`]), numbers of cases ([`cases`]), and optional resources: real data,
+//! programs, and the emulated rig. Tests without their resource count as skipped. The crate's build script calls [`declare`], which sets the
 //! configuration `shared_data`; the test has `#[cfg_attr(not(shared_data), ignore = "needs the real data beside
 //! the repository")]` and uses [`path`]. Build scripts watch only files that exist: cargo treats missing ones as
 //! changed and would rebuild the crate each time. `cargo xtask test` reruns them when [`at_hand`] changes.
@@ -65,6 +65,11 @@ fn data() -> Option<PathBuf> {
 fn on_the_path(program: &str) -> Option<PathBuf> {
     let path = std::env::var_os("PATH")?;
     std::env::split_paths(&path).map(|folder| folder.join(program)).find(|place| place.is_file())
+}
+
+/// Cases of a property: `PROPTEST_CASES` when fuzzing, else `usual`.
+pub fn cases(usual: u32) -> u32 {
+    std::env::var("PROPTEST_CASES").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
 }
 
 /// A file or folder of the data, e.g. `breakfast/far.png`.

@@ -128,23 +128,14 @@ fn with_cameras(release: &Release, kinds: &[&str]) -> Result<(PathBuf, String)> 
     step(&format!("programs with cameras: {}", kinds.join(", ")));
     let folder = target_folder().join("release-cameras");
     finish(
-        cargo([
-            "build",
-            "--release",
-            "--locked",
-            "--package",
-            "farnear",
-            "--package",
-            "farnear-sim",
-            "--package",
-            "farnear-campaign",
-        ])
-        .args(["--config", "profile.release.strip=true", "--features"])
-        .arg(kinds.iter().map(|kind| format!("farnear/{kind}")).collect::<Vec<_>>().join(","))
-        .arg("--target-dir")
-        .arg(&folder)
-        .env("SOURCE_DATE_EPOCH", &release.epoch)
-        .env("CARGO_ENCODED_RUSTFLAGS", without_paths().join("\u{1f}")),
+        cargo(["build", "--release", "--locked"])
+            .args(crate::host::packages(&crate::host::PROGRAMS))
+            .args(["--config", "profile.release.strip=true", "--features"])
+            .arg(kinds.iter().map(|kind| format!("farnear/{kind}")).collect::<Vec<_>>().join(","))
+            .arg("--target-dir")
+            .arg(&folder)
+            .env("SOURCE_DATE_EPOCH", &release.epoch)
+            .env("CARGO_ENCODED_RUSTFLAGS", without_paths().join("\u{1f}")),
     )?;
     let programs = folder.join("release");
     let source = release.work.join("shlibdeps");

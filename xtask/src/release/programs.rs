@@ -46,21 +46,12 @@ pub fn build(release: &Release, target: &Target) -> Result<Result<PathBuf, Strin
     }
     let variable = format!("CARGO_TARGET_{}_LINKER", target.triple.to_uppercase().replace('-', "_"));
     finish(
-        cargo([
-            "build",
-            "--release",
-            "--locked",
-            "--package",
-            "farnear",
-            "--package",
-            "farnear-sim",
-            "--package",
-            "farnear-campaign",
-        ])
-        .args(["--target", target.triple, "--config", "profile.release.strip=true"])
-        .env(variable, "rust-lld")
-        .env("SOURCE_DATE_EPOCH", &release.epoch)
-        .env("CARGO_ENCODED_RUSTFLAGS", without_paths().join("\u{1f}")),
+        cargo(["build", "--release", "--locked"])
+            .args(crate::host::packages(&crate::host::PROGRAMS))
+            .args(["--target", target.triple, "--config", "profile.release.strip=true"])
+            .env(variable, "rust-lld")
+            .env("SOURCE_DATE_EPOCH", &release.epoch)
+            .env("CARGO_ENCODED_RUSTFLAGS", without_paths().join("\u{1f}")),
     )?;
     Ok(Ok(target_folder().join(target.triple).join("release")))
 }

@@ -5,6 +5,7 @@ use core::{arch::naked_asm, panic::PanicInfo};
 use cortex_m::peripheral::SCB;
 
 use super::retained::{Last, leave};
+use crate::{light, piezo};
 
 /// Stack limit, see `memory.x`: a fault with the stack pointer near or below it is an overflow.
 const STACK_LOWEST: u32 = 0x2000_0000;
@@ -34,12 +35,15 @@ fn panic(info: &PanicInfo<'_>) -> ! {
 }
 
 /// Clock security interrupt: the external clock has stopped, which broke the motors' timers; the internal one is used.
+/// The supply may end next, so light and piezo do not wait for the start.
 // SAFETY: it never returns. Retained memory that was being written is rejected by `leave` and after the
 // reset.
 #[cortex_m_rt::exception]
 unsafe fn NonMaskableInt() -> ! {
     cortex_m::interrupt::disable();
     leave(Last::ClockLost);
+    light::off();
+    piezo::release();
     SCB::sys_reset()
 }
 

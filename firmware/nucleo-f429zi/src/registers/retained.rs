@@ -25,7 +25,7 @@ static RETAINED: Retained = Retained(UnsafeCell::new(MaybeUninit::uninit()));
 /// The DAC's code in the lower half, its complement in the upper.
 struct PiezoCode(UnsafeCell<MaybeUninit<u32>>);
 
-// SAFETY: all access is by single, aligned, volatile words, from thread mode only.
+// SAFETY: all access is by single, aligned, volatile words, from thread mode and an interrupt that never returns.
 unsafe impl Sync for PiezoCode {}
 
 // SAFETY: as of `RETAINED`.
@@ -33,7 +33,12 @@ unsafe impl Sync for PiezoCode {}
 static PIEZO_CODE: PiezoCode = PiezoCode(UnsafeCell::new(MaybeUninit::uninit()));
 
 pub fn keep_piezo_code(code: u16) {
-    let word = u32::from(code) | u32::from(!code) << 16;
+    set_piezo_code(Some(code));
+}
+
+/// `None`: unknown.
+pub fn set_piezo_code(code: Option<u16>) {
+    let word = code.map_or(0, |code| u32::from(code) | u32::from(!code) << 16);
     // SAFETY: the place is valid, aligned static memory; see `PiezoCode`.
     unsafe { PIEZO_CODE.0.get().cast::<u32>().write_volatile(word) };
 }

@@ -37,10 +37,13 @@ impl OuterClock {
         self.failure.store(false, Ordering::Relaxed);
     }
 
-    pub fn interrupt(&self, processor: &mut dyn Processor, now: VirtualNanos) {
-        if self.failure.swap(false, Ordering::Relaxed) {
+    /// Returns whether it came: from now on the internal oscillator clocks the processor.
+    pub fn interrupt(&self, processor: &mut dyn Processor, now: VirtualNanos) -> bool {
+        let failed = self.failure.swap(false, Ordering::Relaxed);
+        if failed {
             processor.debugger_access(Some(NMIPENDSET), ICSR, Width::W32, now);
         }
+        failed
     }
 
     pub fn seen(&self, access: &Access, value: u64) -> u64 {

@@ -47,6 +47,16 @@ fn the_outputs_are_as_bright_as_requested_and_dark_after_stop_alarm_reset_and_si
 }
 
 #[test]
+fn a_lost_clock_darkens_the_outputs_before_the_piezo_is_lowered() {
+    let mut bench = Bench::new(1);
+    switch(&mut bench, LEVELS, SILENCE);
+    bench.access(|rig| rig.set_outer_clock(false));
+    // The reset comes 4.4 ms later.
+    bench.rig.advance_us(200).expect("runs");
+    assert_eq!(lights(&mut bench), DARK);
+}
+
+#[test]
 fn a_flash_is_within_its_exposure_and_stamped_to_the_microsecond() {
     let mut bench = Bench::new(1);
     let shots = [fine_shot(50_000, 5_000, 50, 2_000), fine_shot(60_000, 5_000, 50, 2_000)];

@@ -89,6 +89,23 @@ fn unplugging_the_board_with_the_amplifier_on_does_not_snap_the_stack() {
 }
 
 #[test]
+fn a_clock_that_ends_before_the_supply_does_not_snap_the_stack() {
+    // In several parts of a tick; 5 ms do not suffice for a start.
+    for (rest_us, left_us) in [(0, 5_000), (15, 5_000), (30, 5_000), (45, 100_000)] {
+        let mut bench = Bench::new(1);
+        bench.move_to(Axis::SensorFine, Nanometres(156_000));
+        bench.rig.advance_us(rest_us).expect("runs");
+        bench.access(|rig| rig.set_outer_clock(false));
+        bench.rig.advance_us(left_us).expect("runs");
+        bench.access(|rig| rig.set_power(false));
+        bench.rig.advance_us(100_000).expect("runs");
+        let pulled = bench.report().piezo_pulled_um;
+        println!("{rest_us} us after the move, {left_us} us left: pulled by {pulled:.1} um");
+        assert!((20.0..90.0).contains(&pulled), "{pulled} um");
+    }
+}
+
+#[test]
 fn floating_selects_at_a_reset_move_the_piezo_and_resistors_prevent_it() {
     let jump = |resistors| {
         let mut bench = rig_with(|parts| parts.wires.resistors = resistors);

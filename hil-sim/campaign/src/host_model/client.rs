@@ -28,9 +28,10 @@ pub enum Ended {
     Gone,
 }
 
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Counts {
     pub answered: u64,
+    /// Long work that ended with and without success.
     pub done: u32,
     pub failed: u32,
     pub alarms: u32,

@@ -26,7 +26,7 @@ fn every_property_holds_in_each_recorded_scenario() {
                     let Some(file) = next.lock().expect("not poisoned").next() else { return };
                     let scenario = Scenario::read(file).unwrap_or_else(|error| panic!("{error}"));
                     let outcome = play_alone(&scenario, None).unwrap_or_else(|error| panic!("{error}"));
-                    assert!(outcome.answered > 10, "{} plays nothing: {outcome:?}", file.display());
+                    assert!(outcome.counts.answered > 10, "{} plays nothing: {outcome:?}", file.display());
                     failures.lock().expect("not poisoned").extend(
                         outcome.broken.iter().map(|broken| format!("{}: {broken:?}", file.display())),
                     );

@@ -3,19 +3,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a test's helpers fail by panicking, as the tests do")]
 
-use crate::ray_caster::{RayCaster, radial_quantiles, scene_blur};
-use farnear_scene::{
-    Camera, EllipticalDistortion, Lens, Noise, OpticsFile, Picture, Psf, Renderer, Scene, Texture,
+use crate::{
+    ray_caster::{RayCaster, radial_quantiles, scene_blur},
+    thesis_lens,
 };
+use farnear_scene::{Camera, EllipticalDistortion, Lens, Noise, Picture, Psf, Renderer, Scene, Texture};
 use ndarray::Array2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-
-fn thesis_lens() -> Lens {
-    let text = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n\
-                [focus]\nfar_mm = 933.0\nmax_blur_px = 2.703";
-    Lens::from_optics(&OpticsFile::parse(text).unwrap()).unwrap()
-}
 
 /// The hardest texture: mean 1, SD 0.2, uncorrelated.
 fn noise(camera: &Camera) -> Array2<f32> {

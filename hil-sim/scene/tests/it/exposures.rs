@@ -2,17 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test's helpers fail by panicking, as the tests do")]
 
+use crate::thesis_lens;
 use farnear_scene::{
-    Camera, HeightMap, Lens, Noise, OpticsFile, Psf, RenderError, Renderer, Scene, Shape, render, render_f32,
-    truth,
+    Camera, HeightMap, Noise, Psf, RenderError, Renderer, Scene, Shape, render, render_f32, truth,
 };
 use ndarray::{Array2, s};
-
-fn thesis_lens() -> Lens {
-    let text = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n\
-                [focus]\nfar_mm = 933.0\nmax_blur_px = 2.703";
-    Lens::from_optics(&OpticsFile::parse(text).unwrap()).unwrap()
-}
 
 fn scene(text: &str) -> Scene {
     text.parse().unwrap()

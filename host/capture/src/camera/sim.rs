@@ -219,9 +219,11 @@ impl Camera for SimCamera {
                     Err(()) => return Err(self.ended()),
                 };
             let FrameHeader { shot_id, exposure, .. } = frame.header;
-            let later = if shot_id == FREE_RUNNING {
-                let apart = exposure.0.abs_diff(shot.strobe_start.0) > SAME_MOMENT_US;
-                i32::from(apart) * if exposure < shot.strobe_start { -1 } else { 1 }
+            let later = if exposure.0.abs_diff(shot.strobe_start.0) <= SAME_MOMENT_US {
+                // The simulator numbers only exposures by the trigger line, the board also others.
+                0
+            } else if shot_id == FREE_RUNNING {
+                if exposure < shot.strobe_start { -1 } else { 1 }
             } else {
                 shot_id.wrapping_sub(wanted) as i32
             };

@@ -83,6 +83,12 @@ impl Owner {
             }
             ClientError::TakenOver { .. } => Break::TakenOver,
             ClientError::OtherBoard { was, now, .. } => Break::OtherBoard { was: *was, now: *now },
+            // Each further request would wait as long. A real board is asked again, because answers get lost.
+            ClientError::Silent { attempts, waited, .. }
+                if self.link.interrupted() && self.session.hello.emulated =>
+            {
+                Break::Silent { attempts: *attempts, waited: *waited }
+            }
             _ => return,
         };
         self.end_session(broken);
@@ -115,7 +121,9 @@ impl Owner {
         let taken = matches!(self.broken, Some(Break::TakenOver));
         // Likewise another board.
         let others = matches!(self.broken, Some(Break::OtherBoard { .. }));
-        if !nobodys && !taken && !others && Instant::now() >= self.next_attempt {
+        // An interrupted program ends.
+        let ends = self.link.interrupted();
+        if !nobodys && !taken && !others && !ends && Instant::now() >= self.next_attempt {
             // Retried while handles exist.
             let _ = self.reconnect();
         }

@@ -70,7 +70,11 @@ fn reads_new_images_in_order_and_waits_for_incomplete_ones() {
 }
 
 fn send(stream: &mut TcpStream, shot_id: u32) {
-    let header = FrameHeader { shot_id, exposure: BoardMicros(9), width: 2, height: 1, bits: 8 };
+    send_at(stream, shot_id, 1_000_000);
+}
+
+fn send_at(stream: &mut TcpStream, shot_id: u32, board_us: u64) {
+    let header = FrameHeader { shot_id, exposure: BoardMicros(board_us), width: 2, height: 1, bits: 8 };
     stream.write_all(&header.length().to_le_bytes()).unwrap();
     stream.write_all(&header.to_bytes()).unwrap();
     stream.write_all(&[shot_id as u8, 0, 255, 0]).unwrap();
@@ -116,6 +120,20 @@ fn arming_drops_images_from_before_a_reset_of_the_board() {
     camera.arm(TriggerMode::Hardware, Micros(1)).unwrap();
     send(&mut simulator, 0);
     assert_eq!(camera.image(&shot(0), wait).unwrap().pixels[[0, 0]], 0);
+}
+
+#[test]
+fn an_image_of_the_exposures_moment_is_its_image() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let mut camera = SimCamera::connect(&listener.local_addr().unwrap().to_string()).unwrap();
+    let (mut simulator, _) = listener.accept().unwrap();
+    // Six software triggers came first, which the board numbers, too.
+    for (shot_id, board_us) in [(0, 10_000), (1, 30_000)] {
+        send_at(&mut simulator, shot_id, board_us);
+        let taken = ShotRecord { strobe_start: BoardMicros(board_us + 1), ..shot(6 + shot_id) };
+        let image = camera.image(&taken, Duration::from_secs(20)).unwrap();
+        assert_eq!(u32::from(image.pixels[[0, 0]]), shot_id);
+    }
 }
 
 #[test]

@@ -15,9 +15,9 @@ pub(super) struct Agreement {
     ring: usize,
     small: [Plane; 2],
     large: [Plane; 2],
-    /// Squared difference relative to the variance, and 1 where there is one.
-    difference: [Plane; 2],
-    /// Sums of the differences over the rows, then over rows and columns.
+    /// Squared difference relative to the variance, 1 where there is one, and there alpha of the large window.
+    compared: [Plane; 3],
+    /// Sums of these over the rows, then over rows and columns.
     sums: Plane,
     work: Vec<f32>,
 }
@@ -27,15 +27,15 @@ impl Agreement {
     pub fn new(side: usize, wide: usize, of: Contrast) -> Self {
         let half = side / 2;
         let ring = 2 * half + 2;
-        let planes = || [(); 2].map(|()| Plane::new(ring, wide));
+        let plane = || Plane::new(ring, wide);
         Self {
             half,
             of,
             ring,
-            small: planes(),
-            large: planes(),
-            difference: planes(),
-            sums: Plane::new(4, wide),
+            small: [plane(), plane()],
+            large: [plane(), plane()],
+            compared: [plane(), plane(), plane()],
+            sums: Plane::new(6, wide),
             work: vec![0.0; 2 * wide],
         }
     }
@@ -56,10 +56,10 @@ impl Agreement {
             to.row_mut(at)[..wide].copy_from_slice(from);
         }
         let [alpha, variance] = &mut self.small;
-        let [difference, counted] = &mut self.difference;
-        let to = [alpha, variance, difference, counted].map(|plane| &mut plane.row_mut(at)[..wide]);
+        let [difference, counted, larger] = &mut self.compared;
+        let to = [alpha, variance, difference, counted, larger].map(|plane| &mut plane.row_mut(at)[..wide]);
         simd::contrast_row(backend, self.of, small, large, to);
-        for (index, plane) in self.difference.iter().enumerate() {
+        for (index, plane) in self.compared.iter().enumerate() {
             let sums = &mut self.sums.row_mut(index)[..wide];
             if row == 0 || restart {
                 sums.fill(0.0);
@@ -80,8 +80,8 @@ impl Agreement {
         let at = (row - self.half) % self.ring;
         let width = wide - 2 * self.half;
         let stride = self.sums.stride();
-        let (of_rows, of_windows) = self.sums.all_mut().split_at_mut(2 * stride);
-        for index in 0..2 {
+        let (of_rows, of_windows) = self.sums.all_mut().split_at_mut(3 * stride);
+        for index in 0..3 {
             let sums = &mut of_windows[index * stride..][..width];
             simd::row_sums(
                 backend,
@@ -94,7 +94,7 @@ impl Agreement {
         let (first, last) = (self.half, self.half + width);
         let [small, large] = [&self.small, &self.large]
             .map(|planes| planes.each_ref().map(|plane| &plane.row(at)[first..last]));
-        let sums = [&of_windows[..width], &of_windows[stride..][..width]];
-        simd::decide_row(backend, self.of.doubt, sums, small, large, to);
+        let sums = [0, 1, 2].map(|index| &of_windows[index * stride..][..width]);
+        simd::decide_row(backend, self.of, sums, small, large, to);
     }
 }

@@ -26,8 +26,9 @@ const FLOOR: f32 = 0.0026;
 /// and slants for an error over deviation of 0.9 to 1.25.
 const DOUBT: f32 = 0.5;
 /// The same for a learned lens, whose windows are larger: a window of 41 px is off by 1.08 of its difference from one of 11 px
-/// where the surface curves evenly.
-const DOUBT_LEARNED: f32 = 1.0;
+/// where the surface curves evenly, and by as much as it differs from its own mean over the window. The model's error may hide
+/// the former.
+const LEARNED: [f32; 2] = [1.0, 1.0];
 /// Standard deviation of alpha from which a window tells nothing about the surface.
 const UNINFORMATIVE: f32 = 0.045;
 /// Standard deviation of alpha, at alpha = 0, that is certain enough.
@@ -150,9 +151,9 @@ impl<'a> Tile<'a> {
             agreement: (compared > 0).then(|| {
                 // The model error of a learned lens must not count as a depth step.
                 let tolerance = job.optics.stage().map_or(0.0, |stage| stage.window_tolerance as f32).powi(2);
-                let doubt = if job.optics.stage().is_some() { DOUBT_LEARNED } else { DOUBT };
+                let [doubt, curvature] = if job.optics.stage().is_some() { LEARNED } else { [DOUBT, 0.0] };
                 let largest = UNINFORMATIVE.powi(2) + tolerance;
-                let of = Contrast { gain: variance_gain, tolerance, largest, doubt };
+                let of = Contrast { gain: variance_gain, tolerance, largest, doubt, curvature };
                 Agreement::new(2 * compared + 1, wide, of)
             }),
             alpha: Plane::new(WAITING, wide),

@@ -5,6 +5,7 @@ use ndarray::{Array2, ArrayView2, CowArray, Ix2, Zip};
 use crate::border::reflect;
 use crate::confidence;
 use crate::fill;
+use crate::median::medians;
 use crate::metrics::dilate_square;
 use crate::optics::Optics;
 use crate::pipeline::{
@@ -82,7 +83,7 @@ impl Pair {
         let scale = confidence::texture_scale(texture.view());
         let low = texture.iter().filter(|t| **t < confidence::LOW_TEXTURE * scale).count();
         let low_texture_fraction = low as f64 / texture.len() as f64;
-        let mut depth_mm = median(&alpha, settings.median_px);
+        let mut depth_mm = medians(alpha, settings.median_px);
         let mut values = texture;
         Zip::from(&mut depth_mm).and(&mut values).and(&misfit).for_each(|depth, value, misfit| {
             *value =
@@ -100,26 +101,6 @@ impl Pair {
         map.warnings.extend(warnings_after(&map, optics));
         map
     }
-}
-
-fn median(map: &Array2<f32>, side: usize) -> Array2<f32> {
-    let (height, width) = map.dim();
-    let reach = side / 2;
-    let mut window = Vec::with_capacity(side * side);
-    Array2::from_shape_fn((height, width), |(row, column)| {
-        if side == 1 || map[(row, column)].is_nan() {
-            return map[(row, column)];
-        }
-        window.clear();
-        for y in row.saturating_sub(reach)..(row + reach + 1).min(height) {
-            for x in column.saturating_sub(reach)..(column + reach + 1).min(width) {
-                window.push(map[(y, x)]);
-            }
-        }
-        window.retain(|value| !value.is_nan());
-        let middle = window.len() / 2;
-        *window.select_nth_unstable_by(middle, f32::total_cmp).1
-    })
 }
 
 #[derive(Clone, Copy)]

@@ -4,7 +4,7 @@ use ndarray::Array2;
 
 use crate::optics::Optics;
 use crate::prepare::band::without_holes;
-use crate::prepare::{Align, Balance, PrepareError, PrepareSettings, Report, prepare_owned};
+use crate::prepare::{Align, Balance, PrepareError, PrepareSettings, Report, prepare};
 
 /// Prepares the images `[far, near]` of a target for [`fit_psf`](super::fit_psf), with a report. A misregistration of 1
 /// px looks like a wider PSF: `k` of 0.516 instead of 0.458. Pixels beyond an image's edge are set to the mean; windows
@@ -20,7 +20,7 @@ pub fn made_ready(
     }
     let settings =
         PrepareSettings { align, balance: Balance::Auto, trust: true, ..PrepareSettings::default() };
-    let prepared = prepare_owned(images, optics, None, &settings)?;
+    let prepared = prepare(images, optics, None, &settings)?;
     let [far, near] = [prepared.far, prepared.near].map(|image| without_holes(image.view()).into_owned());
     Ok(([far, near], prepared.report))
 }

@@ -13,25 +13,14 @@ impl Method {
 
     /// Names of all methods with descriptions, for help texts.
     pub fn choices() -> String {
-        Self::listed(Self::ALL.map(Self::with_summary).to_vec(), "or")
-    }
-
-    /// As [`Self::choices`] of the methods that a board can compute.
-    pub fn board_choices() -> String {
-        Self::listed(Self::on_board().map(Self::with_summary).collect(), "or")
+        let with_summary = |method: Self| format!("{} ({})", method.name(), method.summary());
+        Self::listed(Self::ALL.map(with_summary).to_vec(), "or")
     }
 
     /// The names of the methods that a board can compute, such as "clsf and clsf-full".
     pub fn board_names() -> String {
-        Self::listed(Self::on_board().map(|method| method.name().to_owned()).collect(), "and")
-    }
-
-    fn on_board() -> impl Iterator<Item = Self> {
-        Self::ALL.into_iter().filter(|method| method.board_form().is_some())
-    }
-
-    fn with_summary(self) -> String {
-        format!("{} ({})", self.name(), self.summary())
+        let on_board = Self::ALL.into_iter().filter(|method| method.board_form().is_some());
+        Self::listed(on_board.map(|method| method.name().to_owned()).collect(), "and")
     }
 
     fn listed(mut words: Vec<String>, conjunction: &str) -> String {

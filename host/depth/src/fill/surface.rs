@@ -8,6 +8,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::Sample;
+use crate::median::deviation;
 
 const MIN_SAMPLES: usize = 12;
 
@@ -105,7 +106,7 @@ impl Surface {
     }
 
     fn spread_mm(&self, samples: &[Sample]) -> f64 {
-        deviation(samples.iter().map(|s| s.depth_mm - self.value(s.y, s.x)).collect())
+        deviation(samples.iter().map(|s| s.depth_mm - self.value(s.y, s.x))).unwrap_or(0.0)
     }
 
     fn value(&self, y: f64, x: f64) -> f64 {
@@ -115,16 +116,6 @@ impl Surface {
     pub fn depth_mm(&self, y: usize, x: usize) -> f32 {
         self.value(y as f64, x as f64).clamp(self.limits[0], self.limits[1]) as f32
     }
-}
-
-/// Standard deviation of a normal distribution from the median absolute deviation (factor 1.4826).
-fn deviation(mut residuals: Vec<f64>) -> f64 {
-    residuals.iter_mut().for_each(|r| *r = r.abs());
-    let middle = residuals.len() / 2;
-    if residuals.is_empty() {
-        return 0.0;
-    }
-    1.4826 * *residuals.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// First `N` coefficients and the robust residual variance; `None` if the samples do not determine them.
@@ -154,7 +145,7 @@ fn fit_robustly<const N: usize>(rows: &[[f64; 10]], samples: &[Sample]) -> Optio
                 (s.depth_mm - value).abs() * (s.weight / s.independent).sqrt()
             })
             .collect();
-        let spread = deviation(outlying.clone());
+        let spread = deviation(outlying.iter().copied()).unwrap_or(0.0);
         let limit = (HUBER * spread).max(f64::MIN_POSITIVE);
         for ((weight, outlying), sample) in weights.iter_mut().zip(&outlying).zip(samples) {
             *weight = sample.weight / (outlying / limit).max(1.0);

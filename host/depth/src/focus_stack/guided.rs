@@ -11,6 +11,8 @@
 use ndarray::{Array2, ArrayView2, Axis, Zip};
 use rayon::prelude::*;
 
+use crate::median::median;
+
 /// The window's radius in its standard deviations; pixels beyond have less than 6 % of the weight of the centre.
 const RADIUS: f32 = 2.4;
 /// Sampled places per standard deviation.
@@ -55,7 +57,8 @@ pub(super) fn mended<E>(
     let equal = (EQUAL * guide.sharp.std(0.0)).max(f32::MIN_POSITIVE);
     let table: Vec<f32> =
         (0..=(END * STEPS) as usize).map(|step| (-0.5 * (step as f32 / STEPS).powi(2)).exp()).collect();
-    let noise = (NOISE * middle(guide.sharpness)).max(f32::MIN_POSITIVE);
+    let usual = median(guide.sharpness.iter().copied().collect(), f32::total_cmp).unwrap_or(0.0);
+    let noise = (NOISE * usual).max(f32::MIN_POSITIVE);
     let mut says = rise;
     Zip::from(&mut says)
         .and(guide.sharpness)
@@ -106,13 +109,6 @@ fn offsets(reach_px: f32) -> Vec<(isize, isize, f32)> {
         .filter(|(.., square)| *square <= radius * radius)
         .map(|(down, across, square)| (down, across, (-0.5 * square / (reach_px * reach_px)).exp()))
         .collect()
-}
-
-/// The median of a map.
-fn middle(map: ArrayView2<f32>) -> f32 {
-    let mut values: Vec<f32> = map.iter().copied().collect();
-    let half = values.len() / 2;
-    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(half, f32::total_cmp).1 }
 }
 
 /// Weights, and weighted places, by place.
@@ -214,13 +210,6 @@ mod tests {
             // The mean of a bin is rounded.
             assert!((found[(20, 22)] - 2.0).abs() < 1e-4, "{stripe}: {}", found[(20, 22)]);
         }
-    }
-
-    #[test]
-    fn the_middle_of_a_map_is_its_median() {
-        assert_eq!(middle(ndarray::array![[5.0, 1.0, 9.0, 3.0, 7.0]].view()), 5.0);
-        assert_eq!(middle(ndarray::array![[5.0, 1.0], [9.0, 3.0]].view()), 5.0);
-        assert_eq!(middle(Array2::zeros((0, 4)).view()), 0.0);
     }
 
     #[test]

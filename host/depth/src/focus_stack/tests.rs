@@ -234,20 +234,6 @@ fn places_end_with_the_stack() {
 }
 
 #[test]
-fn the_median_is_that_of_the_part_of_the_window_inside_the_picture() {
-    let map = Array2::from_shape_fn((9, 12), |(y, x)| ((x * 7919 + y * 104_729 + x * y * 31) % 97) as f32);
-    for side in [1, 3, 5] {
-        let found = median(map.clone(), side);
-        for ((y, x), found) in found.indexed_iter() {
-            let near = |(at, _): &((usize, usize), &f32)| at.0.abs_diff(y).max(at.1.abs_diff(x)) <= side / 2;
-            let mut window: Vec<f32> = map.indexed_iter().filter(near).map(|(_, v)| *v).collect();
-            window.sort_by(f32::total_cmp);
-            assert_eq!(*found, window[window.len() / 2], "{side} at {x}, {y}");
-        }
-    }
-}
-
-#[test]
 fn a_pixel_is_mixed_of_two_images_or_is_the_nearest_that_was_seen() {
     let mixed = |values: [f32; 4], place| {
         let images = values.map(|value| Array2::from_elem((1, 1), value));

@@ -52,7 +52,7 @@ pub fn design(
     Ok([gm1.scaled(scale), gp1.scaled(scale), gp2.scaled(scale)])
 }
 
-pub(super) fn starting_kernels(fit: &RatioFit, size: usize) -> Result<[Kernel; 3], DesignError> {
+fn starting_kernels(fit: &RatioFit, size: usize) -> Result<[Kernel; 3], DesignError> {
     // The cubic's coefficients at any frequency: linear between the table's, constant beyond.
     let at = |column: &[f64], w: f64| {
         let table = &fit.frequency_rad_px;

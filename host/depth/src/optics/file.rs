@@ -227,25 +227,7 @@ impl From<Optics> for OpticsFile {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const RIG: &str = "
-        [lens]
-        focal_length_mm = 50.0
-        aperture_mm = 12.8
-        [sensor]
-        pixel_um = 7.4
-        [focus]
-        far_mm = 933.0
-        max_blur_px = 2.703
-        [psf]
-        model = \"generalised\"
-        p = 1.8
-        k = 0.4802
-    ";
-
-    fn rig() -> OpticsFile {
-        toml::from_str(RIG).unwrap()
-    }
+    use crate::optics::tests::{RIG, rig};
 
     #[test]
     fn near_distance_and_blur_follow_from_each_other() {

@@ -26,7 +26,7 @@ pub struct Stage {
     /// Least blur radius of the lens (diffraction, aberration), binned px: radii are `sqrt(geometric^2 + floor^2)`.
     #[serde(default)]
     pub blur_floor_px: f64,
-    /// Tolerance of normalised depth between windows of several sizes.
+    /// Tolerance of measured normalised depth between windows of several sizes.
     #[serde(default)]
     pub window_tolerance: f64,
     /// Standard deviation of normalised depth beyond noise, on held-out parts of the target.

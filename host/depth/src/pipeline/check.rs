@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::{Backend, DepthMap, MAX_SMOOTHING_PX, MIN_SIDE_PX, RunError, Settings, SwapEvidence, Warning};
 use crate::confidence;
+use crate::median::median;
 use crate::operators::Operators;
 use crate::optics::Optics;
 use crate::simd::{self, Extremes};
@@ -244,10 +245,7 @@ pub(crate) fn after(map: &DepthMap, optics: &Optics) -> Option<Warning> {
     if thirds.iter().any(|third| third.len() < total / 6 + 10) {
         return None;
     }
-    let [upper, middle, lower] = thirds.map(|mut third| {
-        let half = third.len() / 2;
-        f64::from(*third.select_nth_unstable_by(half, f32::total_cmp).1)
-    });
+    let [upper, middle, lower] = thirds.map(|third| median(third, f32::total_cmp).map_or(0.0, f64::from));
     let range = optics.working_range();
     let least = TILT * (range.far_mm - range.near_mm);
     (middle - upper > least && lower - middle > least)

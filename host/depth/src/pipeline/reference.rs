@@ -33,7 +33,7 @@ pub(crate) fn convolve(image: ArrayView2<f32>, kernel: &Kernel) -> Array2<f32> {
 }
 
 /// Window sums with reflected borders, rows first.
-pub(crate) fn box_sum(image: &Array2<f32>, size: usize) -> Array2<f32> {
+fn box_sum(image: &Array2<f32>, size: usize) -> Array2<f32> {
     let (height, width) = image.dim();
     let r = (size / 2) as isize;
     let rows = Array2::from_shape_fn((height, width), |(y, x)| {

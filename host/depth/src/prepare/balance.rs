@@ -11,6 +11,7 @@ use ndarray::{ArrayView2, ArrayViewMut2, Axis};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use crate::median::deviation;
 use crate::operators::least_squares;
 
 /// Blocks along the shorter side.
@@ -184,9 +185,7 @@ fn robust(rows: &[Vec<f64>], target: &[f64], weights: &[f64]) -> Option<(Vec<f64
             .zip(target)
             .map(|(row, t)| t - row.iter().zip(coefficients.iter()).map(|(a, b)| a * b).sum::<f64>())
             .collect();
-        let mut sizes: Vec<f64> = left.iter().map(|l| l.abs()).collect();
-        let middle = sizes.len() / 2;
-        let rms = (1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1).max(1e-12);
+        let rms = deviation(left.iter().copied())?.max(1e-12);
         // Huber's weights.
         trust = left.iter().map(|l| (1.5 * rms / l.abs().max(1e-300)).min(1.0)).collect();
         found = (coefficients.as_slice().to_vec(), rms);

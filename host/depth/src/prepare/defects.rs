@@ -4,6 +4,7 @@
 
 use ndarray::{Array2, ArrayView2, Axis};
 
+use crate::confidence;
 use crate::reason::Reason;
 
 /// Half the side of the neighbourhood that decides whether a defect is single.
@@ -16,6 +17,19 @@ const HIGHLIGHT: f32 = 0.65;
 
 /// Largest part of an image above the level at which it is clipped: hot pixels.
 const HOT: f64 = 1e-4;
+
+/// Magnitude that light does not reach in a file of floats, relative to the usual one: in sums of squares, one such pixel
+/// outweighs all others.
+const WILD: f32 = 1000.0;
+
+/// Magnitude that one of 1000 pixels exceeds; `None` for an image that is black almost everywhere.
+pub(crate) fn usual_magnitude(image: ArrayView2<f32>) -> Option<f32> {
+    let sample = image.slice(confidence::sample(image.dim()));
+    let mut sizes: Vec<f32> = sample.iter().map(|v| v.abs()).filter(|size| size.is_finite()).collect();
+    let place = sizes.len().checked_sub(2 + sizes.len() / 1000)?;
+    let usual = *sizes.select_nth_unstable_by(place, f32::total_cmp).1;
+    (usual > 0.0).then_some(usual)
+}
 
 /// Level at which an image is clipped: the brightest 3x3 patch of one value, if only hot pixels are brighter. A camera
 /// may saturate below full scale, and a float file has none. Cost: some ten operations a pixel.
@@ -60,13 +74,17 @@ fn largest(values: &[f32]) -> f32 {
 }
 
 /// Marks the defects of an image: code of the [`Reason`], 0 = none. `limits` are the black and the white level of a
-/// camera that clips, `bad` its bad pixels. An image that is clipped below its white level is marked there.
+/// camera that clips, `bad` its bad pixels. An image that is clipped below its white level is marked there. Without
+/// limits, a value of [`WILD`] magnitude is a bad pixel.
 pub(super) fn find(
     image: ArrayView2<f32>,
     limits: Option<[f32; 2]>,
     bad: Option<ArrayView2<bool>>,
 ) -> Option<Array2<u8>> {
     let (height, width) = image.dim();
+    // A camera's limits exclude wild values.
+    let usual = if limits.is_none() { usual_magnitude(image) } else { None };
+    let wild = usual.map_or(f32::INFINITY, |usual| WILD * usual);
     let [black, white] = limits.unwrap_or([f32::NEG_INFINITY, f32::INFINITY]);
     let limits = match clipping_level(image) {
         Some(level) => Some([black, white.min(level)]),
@@ -80,6 +98,7 @@ pub(super) fn find(
     };
     // Most rows have no defect; one comparison per pixel excludes them.
     let [low, high] = limits.unwrap_or([f32::NEG_INFINITY, f32::INFINITY]);
+    let [low, high] = [low.max(-wild), high.min(wild)];
     let clean = |row: usize| {
         let fine = |value: &f32| u32::from(*value > low && *value < high);
         bad.is_none()
@@ -94,7 +113,7 @@ pub(super) fn find(
         let value = &image[(y, x)];
         let reason = if !value.is_finite() {
             Reason::NotFinite
-        } else if bad.is_some_and(|bad| bad[(y, x)]) {
+        } else if value.abs() >= wild || bad.is_some_and(|bad| bad[(y, x)]) {
             Reason::BadPixel
         } else if limits.is_some_and(|[_, white]| *value >= white) {
             Reason::Saturated
@@ -192,6 +211,26 @@ mod tests {
             *value += 0.002 * ((y * 5 + x * 3) % 4) as f32;
         });
         assert!(find(image.view(), Some([0.0, 1.0]), None).is_none());
+    }
+
+    #[test]
+    fn a_wild_value_of_a_float_file_is_a_bad_pixel() {
+        for (wild, scale) in [(1e6, 1.0), (-9999.0, 1.0), (1e38, 1e30), (1e-20, 1e-28)] {
+            let scene = |y: usize, x: usize| scale * (0.3 + ((y * 7 + x * 13) % 29) as f32 / 58.0);
+            let mut image = Array2::from_shape_fn((60, 80), |(y, x)| scene(y, x));
+            assert!(find(image.view(), None, None).is_none());
+            // Bright, but light.
+            image[(40, 30)] = 100.0 * scale;
+            image[(10, 20)] = wild;
+            let marks = find(image.view(), None, None).unwrap();
+            assert_eq!(marks.iter().filter(|mark| **mark != 0).count(), 1, "{wild}");
+            assert_eq!(marks[(10, 20)], Reason::BadPixel.code(), "{wild}");
+            mend(&mut image, &marks);
+            assert!(image[(10, 20)] < scale, "{wild}");
+        }
+        // Black with a few bright pixels.
+        let sparse = Array2::from_shape_fn((60, 80), |at| if at == (30, 40) { 5000.0 } else { 0.0 });
+        assert!(find(sparse.view(), None, None).is_none());
     }
 
     #[test]

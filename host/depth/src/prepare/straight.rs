@@ -6,9 +6,9 @@ use super::warp::resample_by;
 use crate::optics::Distortion;
 use crate::reason::Reason;
 
-/// The image without distortion; NaN outside the recorded field. Cost: 36 multiply-adds and the map, some 30
-/// operations, per pixel; on all threads.
-pub(super) fn image(image: ArrayView2<f32>, distortion: &Distortion) -> Array2<f32> {
+/// An image as a lens without distortion would have taken it; NaN where the lens recorded nothing. Cost: 36
+/// multiply-adds and the map, some 30 operations, per pixel; on all threads.
+pub fn straightened(image: ArrayView2<f32>, distortion: &Distortion) -> Array2<f32> {
     resample_by(image, |place| distortion.distorted(place))
 }
 
@@ -60,7 +60,7 @@ mod tests {
             let [x, y] = ideal(x as f64, y as f64);
             wave(x, y) as f32
         });
-        let seen = image(record.view(), &distortion);
+        let seen = straightened(record.view(), &distortion);
         let (mut largest_shift, mut judged) = (0.0_f64, 0);
         for ((y, x), value) in seen.indexed_iter() {
             let [px, py] = distortion.distorted([x as f64, y as f64]);

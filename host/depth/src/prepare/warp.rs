@@ -21,7 +21,7 @@ pub struct Warp {
 }
 
 impl Warp {
-    /// Position in the other image.
+    /// Moves nothing.
     pub const IDENTITY: Self = Self { matrix: [[1.0, 0.0], [0.0, 1.0]], shift: [0.0; 2] };
 
     /// Magnification, rotation (degrees, x towards y) and shift (px) about the middle of an image of (height, width).

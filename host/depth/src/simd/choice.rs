@@ -34,12 +34,14 @@ fn choose_certain_generic<L: Lanes>(
 pub(crate) struct Contrast {
     /// Variance of alpha relative to the window's own, a polynomial in alpha^2.
     pub gain: [f32; 4],
-    /// Variance of alpha within which windows may differ by the model's error.
+    /// Variance of alpha within which windows may differ by the model's error, whose own is [`OF_MODEL`] of it.
     pub tolerance: f32,
     /// Variance of alpha from which a window tells nothing.
     pub largest: f32,
     /// Part of the difference's excess over noise by which the larger window's variance grows.
     pub doubt: f32,
+    /// Part of the surface's curvature over the larger window, beyond noise, by which that variance grows.
+    pub curvature: f32,
 }
 
 /// Largest counted squared difference, relative to the variance.
@@ -49,46 +51,51 @@ const LARGEST_CONTRAST: f32 = 100.0;
 const NOT_FLAT: f32 = 2.0;
 /// The same mean square of a flat surface: 75 % are below.
 const FLAT: f32 = 1.05;
+/// Variance of the model's error in the smaller window, relative to the tolerance; rare large errors make it more than what the
+/// tolerance was taken from. Chosen on a metal plate and a lens with spherical aberration, for honest deviations of planes and waves.
+const OF_MODEL: f32 = 0.6;
 /// Largest growth of the smaller one's variance: a certain depth next to a large step remains certain.
 const LARGEST_GROWTH: f32 = 9.0;
 
 dispatch! {
     /// Compares windows: `to` gets alpha and variance of the smaller one (of the larger one where it tells nothing), the squared
-    /// difference relative to this variance, and 1 where it tells something.
-    fn contrast_row(of: Contrast, small: [&[f32]; 2], large: [&[f32]; 2], to: [&mut [f32]; 4]) = contrast_generic
+    /// difference relative to this variance, 1 where it tells something, and there alpha of the larger one.
+    fn contrast_row(of: Contrast, small: [&[f32]; 2], large: [&[f32]; 2], to: [&mut [f32]; 5]) = contrast_generic
 }
 
 #[inline(always)]
-fn contrast_generic<L: Lanes>(of: Contrast, small: [&[f32]; 2], large: [&[f32]; 2], to: [&mut [f32]; 4]) {
-    let [alpha, variance, difference, counted] = to;
+fn contrast_generic<L: Lanes>(of: Contrast, small: [&[f32]; 2], large: [&[f32]; 2], to: [&mut [f32]; 5]) {
+    let [alpha, variance, difference, counted, larger] = to;
     let width = alpha.len();
     let ([small, of_small], [large, of_large]) = (small.map(|s| &s[..width]), large.map(|s| &s[..width]));
-    let (variance, difference, counted) =
-        (&mut variance[..width], &mut difference[..width], &mut counted[..width]);
+    let [variance, difference, counted, larger] =
+        [variance, difference, counted, larger].map(|row| &mut row[..width]);
     for x in 0..width {
         let a = small[x];
         let factor = polynomial(of.gain, a * a);
-        let total = factor * of_small[x] + of.tolerance;
+        let own = factor * of_small[x] + OF_MODEL * of.tolerance;
+        let total = own + (1.0 - OF_MODEL) * of.tolerance;
         let tells = total <= of.largest;
         let apart = a - large[x];
         let square = (apart * apart / total).min(LARGEST_CONTRAST);
         alpha[x] = if tells { a } else { large[x] };
-        variance[x] = if tells { total / factor } else { of_large[x] };
+        variance[x] = if tells { own / factor } else { of_large[x] };
         difference[x] = if tells { square } else { 0.0 };
         counted[x] = if tells { 1.0 } else { 0.0 };
+        larger[x] = if tells { large[x] } else { 0.0 };
     }
 }
 
 dispatch! {
     /// Alpha and variance of the larger window where the surface is flat, else of the smaller one. `sums` are of
     /// [`contrast_row`]'s differences and counts.
-    fn decide_row(doubt: f32, sums: [&[f32]; 2], small: [&[f32]; 2], large: [&[f32]; 2], to: [&mut [f32]; 2]) = decide_generic
+    fn decide_row(of: Contrast, sums: [&[f32]; 3], small: [&[f32]; 2], large: [&[f32]; 2], to: [&mut [f32]; 2]) = decide_generic
 }
 
 #[inline(always)]
 fn decide_generic<L: Lanes>(
-    doubt: f32,
-    sums: [&[f32]; 2],
+    of: Contrast,
+    sums: [&[f32]; 3],
     small: [&[f32]; 2],
     large: [&[f32]; 2],
     to: [&mut [f32]; 2],
@@ -96,13 +103,20 @@ fn decide_generic<L: Lanes>(
     let [alpha, variance] = to;
     let width = alpha.len();
     let variance = &mut variance[..width];
-    let [[differences, counts], [small, of_small], [large, of_large]] =
-        [sums, small, large].map(|rows| rows.map(|row| &row[..width]));
+    let [differences, counts, larger] = sums.map(|row| &row[..width]);
+    let [[small, of_small], [large, of_large]] = [small, large].map(|rows| rows.map(|row| &row[..width]));
     for x in 0..width {
-        let mean = differences[x] / counts[x].max(1.0);
+        let count = counts[x].max(1.0);
+        let mean = differences[x] / count;
+        let curved = if counts[x] > 0.0 { large[x] - larger[x] / count } else { 0.0 };
         let flat = mean <= NOT_FLAT;
-        // An infinite variance times 0 would be none.
-        let widened = of_large[x] + of_small[x].min(f32::MAX) * (doubt * (mean - FLAT).max(0.0));
+        let factor = polynomial(of.gain, large[x] * large[x]);
+        // The smaller one's variance lacks the rest of the tolerance, which the differences are relative to.
+        let tolerated = (1.0 - OF_MODEL) * of.tolerance / factor;
+        // An infinite variance times 0 is NaN.
+        let apart = (of_small[x].min(f32::MAX) * (mean - FLAT) + mean * tolerated).max(0.0);
+        let curved = (curved * curved / factor - of_large[x]).max(0.0);
+        let widened = of_large[x] + of.doubt * apart + of.curvature * curved;
         alpha[x] = if flat { large[x] } else { small[x] };
         variance[x] = if flat { widened } else { of_small[x] * mean.min(LARGEST_GROWTH) };
     }
@@ -116,22 +130,28 @@ mod tests {
     /// A plane, and a step of 0.2 in the middle, seen by windows with a variance of 1e-3 and 1e-4.
     #[test]
     fn the_larger_window_counts_where_the_surface_is_flat() {
-        let of = Contrast { gain: [1.0, 0.0, 0.0, 0.0], tolerance: 0.0, largest: 2e-3, doubt: 0.5 };
+        let of = Contrast {
+            gain: [1.0, 0.0, 0.0, 0.0],
+            tolerance: 0.0,
+            largest: 2e-3,
+            doubt: 0.5,
+            curvature: 1.0,
+        };
         for backend in Backend::available() {
             let small = [[0.13, 0.30, 0.3], [1e-3, 1e-3, f32::NAN]];
             let large = [[0.11, 0.20, 0.2], [1e-4; 3]];
-            let mut to = [[0.0; 3]; 4];
+            let mut to = [[0.0; 3]; 5];
             let [small, large] = [&small, &large].map(|rows| rows.each_ref().map(|row| &row[..]));
             contrast_row(backend, of, small, large, to.each_mut().map(|row| &mut row[..]));
-            let [alpha, variance, difference, counted] = to;
+            let [alpha, variance, difference, counted, larger] = to;
             assert_eq!((alpha, counted), ([0.13, 0.30, 0.2], [1.0, 1.0, 0.0]));
             assert!((difference[0] - 0.4).abs() < 1e-4 && (difference[1] - 10.0).abs() < 1e-3);
             let (mut chosen, mut of_chosen) = ([0.0; 3], [0.0; 3]);
             let small = [&alpha[..], &variance];
             decide_row(
                 backend,
-                of.doubt,
-                [&difference, &counted],
+                of,
+                [&difference, &counted, &larger],
                 small,
                 large,
                 [&mut chosen, &mut of_chosen],

@@ -2,23 +2,20 @@
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
 use crate::common::rig;
-use farnear_depth::calibrate::{
-    CalibrationError, CapturedPair, FlatTarget, Model, PsfFit, Verdict, fit_psf, made_ready, measure_patterns,
-};
-use farnear_depth::corrections::{CdcSettings, Method, fit};
+use crate::measure::lens;
+use farnear_depth::calibrate::{CalibrationError, CapturedPair, Model, PsfFit, Verdict, fit_psf, made_ready};
+use farnear_depth::corrections::{CdcSettings, Method, Pattern, fit};
 use farnear_depth::focus_measure::{FocusMeasure, peak};
 use farnear_depth::operators::Operators;
 use farnear_depth::optics::Stage;
-use farnear_depth::pipeline::Settings;
+use farnear_depth::pipeline::{Settings, depth_from_pair};
 use farnear_depth::prepare::Align;
 use farnear_depth::psf::Psf;
 use farnear_scene as scene;
 use ndarray::Array2;
 
-const OPTICS: &str = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n[focus]\nfar_mm = 933.0\nmax_blur_px = 2.703\n";
-
 fn pair(depth_mm: f64, psf: &str, camera: &scene::Camera, seed: u64) -> [Array2<f32>; 2] {
-    let lens = scene::Lens::from_optics(&scene::OpticsFile::parse(OPTICS).unwrap()).unwrap();
+    let lens = lens();
     let plane: scene::Scene = format!("plane:{depth_mm}").parse().unwrap();
     let psf: scene::Psf = psf.parse().unwrap();
     let renderer = scene::Renderer::new(&plane, &lens, &psf, camera, seed).unwrap();
@@ -113,7 +110,7 @@ fn pairs_that_say_nothing_of_the_psf_are_refused() {
 
 #[test]
 fn every_focus_measure_peaks_at_best_focus() {
-    let lens = scene::Lens::from_optics(&scene::OpticsFile::parse(OPTICS).unwrap()).unwrap();
+    let lens = lens();
     let plane: scene::Scene = "plane:900".parse().unwrap();
     let psf: scene::Psf = "gaussian:k=0.4578".parse().unwrap();
     let renderer = scene::Renderer::new(&plane, &lens, &psf, &eight_bit(160, 120), 5).unwrap();
@@ -142,42 +139,43 @@ fn every_focus_measure_peaks_at_best_focus() {
 fn a_flat_series_teaches_a_correction() {
     let optics = rig("gaussian:k=0.4578");
     let operators = Operators::for_optics(&optics).unwrap();
-    let lens = scene::Lens::from_optics(&scene::OpticsFile::parse(OPTICS).unwrap()).unwrap();
-    let lens = lens.with_distortion(scene::EllipticalDistortion::default());
+    let lens = lens().with_distortion(scene::EllipticalDistortion::default());
     let psf: scene::Psf = "gaussian:k=0.4578".parse().unwrap();
     let range = optics.working_range();
     let camera = eight_bit(160, 120);
-    let shoot = |depth_mm: f64, seed| {
+    let measured = |depth_mm: f64, seed| {
         let plane: scene::Scene = format!("plane:{depth_mm}").parse().unwrap();
         let renderer = scene::Renderer::new(&plane, &lens, &psf, &camera, seed).unwrap();
-        [lens.sensor_far_mm, lens.sensor_near_mm].map(|at| renderer.expose(at, 0).unwrap().mapv(f32::from))
+        let [far, near] = [lens.sensor_far_mm, lens.sensor_near_mm]
+            .map(|at| renderer.expose(at, 0).unwrap().mapv(f32::from));
+        let map =
+            depth_from_pair(far.view(), near.view(), &operators, &optics, &Settings::default()).unwrap();
+        let mut depth = map.depth_mm;
+        depth.zip_mut_with(&map.confidence, |depth, confidence| {
+            if *confidence < 0.02 {
+                *depth = f32::NAN;
+            }
+        });
+        depth
     };
     let depth = |part: f64| range.far_mm + part * (range.near_mm - range.far_mm);
     let series: Vec<_> = (0..9_u8).map(|i| depth(f64::from(i) / 8.0)).collect();
-    let images: Vec<_> = (0..).zip(&series).map(|(seed, depth_mm)| shoot(*depth_mm, seed)).collect();
-    let targets: Vec<_> = images
+    let maps: Vec<_> = (0..).zip(&series).map(|(seed, depth_mm)| measured(*depth_mm, seed)).collect();
+    let patterns: Vec<_> = maps
         .iter()
         .zip(&series)
-        .map(|([far, near], true_mm)| FlatTarget { far: far.view(), near: near.view(), true_mm: *true_mm })
+        .map(|(map, true_mm)| Pattern { depth_mm: map.view(), true_mm: *true_mm })
         .collect();
-    let patterns = measure_patterns(&targets, &operators, &optics, &Settings::default(), 0.02).unwrap();
-    let patterns: Vec<_> = patterns.iter().map(|pattern| pattern.as_pattern()).collect();
     let correction = fit(Method::ClsfFull, &patterns, &CdcSettings::default()).unwrap();
-    let [far, near] = shoot(depth(0.43), 99);
-    let held_out = [FlatTarget { far: far.view(), near: near.view(), true_mm: depth(0.43) }];
-    let raw = &measure_patterns(&held_out, &operators, &optics, &Settings::default(), 0.02).unwrap()[0];
+    let raw = measured(depth(0.43), 99);
     let rmse = |map: &Array2<f32>| {
         let inner = map.slice(ndarray::s![8..112, 8..152]);
-        let errors = inner.iter().filter(|d| d.is_finite()).map(|d| (f64::from(*d) - raw.true_mm).powi(2));
+        let errors = inner.iter().filter(|d| d.is_finite()).map(|d| (f64::from(*d) - depth(0.43)).powi(2));
         (errors.sum::<f64>() / inner.len() as f64).sqrt()
     };
-    let (before, after) = (rmse(&raw.depth_mm), rmse(&correction.apply(raw.depth_mm.view()).unwrap()));
+    let (before, after) = (rmse(&raw), rmse(&correction.apply(raw.view()).unwrap()));
     println!("raw {before:.3} mm, corrected {after:.3} mm");
     assert!(before > 1.2 && after < 0.75, "{before} {after}");
-    let flat = Array2::from_elem((120, 160), 90.0);
-    let blank = [FlatTarget { far: flat.view(), near: flat.view(), true_mm: 900.0 }];
-    let error = measure_patterns(&blank, &operators, &optics, &Settings::default(), 0.02).unwrap_err();
-    assert!(matches!(error, CalibrationError::FlatTarget { index: 0, .. }));
 }
 
 /// The largest error seen is 0.002, with standard errors of 0.0005 to 0.001; the renderer's aliases add the rest.

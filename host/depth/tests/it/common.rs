@@ -5,8 +5,9 @@
 
 use std::f64::consts::PI;
 
-use farnear_depth::optics::{FocusSection, LensSection, Optics, OpticsFile, SensorSection};
+use farnear_depth::optics::{Optics, OpticsFile};
 use farnear_depth::psf::Psf;
+use farnear_scene::standard;
 use ndarray::Array2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -14,20 +15,8 @@ use rustfft::{FftDirection, FftPlannerScalar, num_complex::Complex64};
 
 /// Rig of Li 2014: 50 mm, aperture 12.8 mm, 7.4 um pixels, 933 mm far focus, largest blur 2.703 px.
 pub fn rig(psf: &str) -> Optics {
-    let file = OpticsFile {
-        lens: LensSection {
-            focal_length_mm: 50.0,
-            aperture_mm: Some(12.8),
-            f_number: None,
-            telecentric: None,
-        },
-        sensor: SensorSection { pixel_um: 7.4 },
-        focus: FocusSection { far_mm: 933.0, max_blur_px: Some(2.703), near_mm: None },
-        psf: psf.parse().unwrap(),
-        distortion: None,
-        stage: None,
-        light: None,
-    };
+    let mut file: OpticsFile = toml::from_str(standard::OPTICS).unwrap();
+    file.psf = psf.parse().unwrap();
     file.check().unwrap()
 }
 

@@ -1,9 +1,10 @@
 //! Corrections learned from a noisy series of flat targets, tested at other depths.
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
+use crate::common::rig;
 use farnear_depth::corrections::{CdcSettings, Correction, CorrectionError, Method, Pattern, fit};
 use farnear_depth::metrics::{CompareSettings, compare};
-use farnear_depth::optics::{Optics, OpticsFile};
+use farnear_depth::optics::Optics;
 use ndarray::Array2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -12,11 +13,6 @@ const PATTERNS: usize = 24;
 const HELD_OUT: usize = 9;
 /// Error of a noisy 8-bit pair, Gaussian PSF, 7x7 smoothing, 3x3 median: 0.6 mm of 46.2 mm for alpha -1 to 1.
 const NOISE_ALPHA: f64 = 0.6 / 23.1;
-
-fn optics() -> Optics {
-    let text = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n[focus]\nfar_mm = 933.0\nmax_blur_px = 2.703\n";
-    toml::from_str::<OpticsFile>(text).unwrap().check().unwrap()
-}
 
 /// Bowl around (0.65, 0.6), deeper at the far end, as in Li 2014, fig. 6.1; x and y in [0, 1].
 fn distorted(alpha: f64, x: f64, y: f64) -> f64 {
@@ -64,7 +60,7 @@ struct Series {
 
 impl Series {
     fn new(dim: (usize, usize), seed: u64) -> Self {
-        let optics = optics();
+        let optics = rig("pillbox");
         let range = optics.working_range();
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut at = |part: f64| {
@@ -119,7 +115,7 @@ fn held_out_depths_come_out_flat() {
 #[test]
 fn blending_leaves_no_step_at_the_seams() {
     let series = Series::new((240, 320), 2);
-    let optics = optics();
+    let optics = rig("pillbox");
     let step_mm = |method| {
         let correction = fit(method, &series.patterns(), &CdcSettings::default()).unwrap();
         let mut largest = 0.0_f32;
@@ -180,7 +176,7 @@ fn the_boards_own_fit_is_as_good() {
     use farnear_maths::clsf::{Columns, DepthScale, Frame, Full, FullFit, RegionFit, Regions};
     let series = Series::new((240, 320), 8);
     let frame = Frame::new(320, 240).unwrap();
-    let range = optics().working_range();
+    let range = rig("pillbox").working_range();
     let scale = DepthScale::for_range(range.far_mm as f32, range.near_mm as f32).unwrap();
     let (mut regions, mut full) = (RegionFit::new(frame), FullFit::new(frame));
     let columns = Columns { first: 2, step: 4 };
@@ -339,8 +335,8 @@ fn unusable_patterns_and_corrections_are_rejected_with_a_reason() {
     let correction = fit(Method::Clsf, &series.patterns(), &settings).unwrap();
     let error = correction.apply(Array2::zeros((60, 81)).view()).unwrap_err();
     assert!(error.to_string().contains("81x60") && error.to_string().contains("80x60"), "{error}");
-    correction.check_range(&optics().working_range()).unwrap();
-    let range = optics().working_range();
+    correction.check_range(&rig("pillbox").working_range()).unwrap();
+    let range = rig("pillbox").working_range();
     let mut wider = range;
     wider.far_mm += 0.8 * (range.far_mm - range.near_mm);
     correction.check_range(&wider).unwrap();

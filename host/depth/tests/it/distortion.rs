@@ -50,7 +50,7 @@ fn a_distorted_and_shifted_pair_is_straight_and_aligned() {
     let [far, near] = [record([0.0; 2]), record(SHIFT)];
     let corner = distortion.distorted([0.0; 2]);
     assert!(corner[0].hypot(corner[1]) > 2.0, "the lens hardly bends: {corner:?}");
-    let ready = prepare(far.view(), near.view(), &optics, None, &PrepareSettings::default()).unwrap();
+    let ready = prepare([far, near], &optics, None, &PrepareSettings::default()).unwrap();
     let found = ready.report.aligned.unwrap().shift_px;
     assert!((found[0] - SHIFT[0]).abs() < 0.02 && (found[1] - SHIFT[1]).abs() < 0.02, "{found:?}");
     for image in [&ready.far, &ready.near] {
@@ -69,7 +69,7 @@ fn a_distorted_and_shifted_pair_is_straight_and_aligned() {
 fn a_camera_matrix_that_leaves_no_pixel_is_refused() {
     let image = Array2::from_shape_fn(SIZE, |(y, x)| scene([x as f64, y as f64]) as f32);
     let prepared =
-        |cx: f64| prepare(image.view(), image.view(), &optics(cx), None, &PrepareSettings::default());
+        |cx: f64| prepare([image.clone(), image.clone()], &optics(cx), None, &PrepareSettings::default());
     let error = prepared(4000.0).unwrap_err().to_string();
     for phrase in ["[distortion] leaves no pixel", "cx = 4000, cy = 81", "200x160 px"] {
         assert!(error.contains(phrase), "{error}");

@@ -102,6 +102,24 @@ fn a_common_gain_and_offset_do_not_matter() {
     }
 }
 
+/// Squares of 2^64 and of 2^-75 are beyond f32.
+#[test]
+fn magnitudes_whose_squares_are_beyond_f32_do_not_matter() {
+    let Bench { optics, pair, .. } = Bench::new(64);
+    let depth = |factor: f32| {
+        let pair = pair.each_ref().map(|image| image * factor);
+        let settings = MeasureSettings::default();
+        measure_pair(pair, &optics, DepthMethod::Whitened, None, &settings).unwrap().map.depth_mm
+    };
+    let plain = depth(1.0);
+    assert!(plain.iter().filter(|depth| depth.is_finite()).count() > 2000);
+    for exponent in [64.0_f32, 90.0, -90.0] {
+        for (a, b) in plain.iter().zip(&depth(exponent.exp2())) {
+            assert!(a.is_nan() && b.is_nan() || (a - b).abs() < 0.02, "{a} {b} at 2^{exponent}");
+        }
+    }
+}
+
 #[test]
 fn around_an_invalid_pixel_there_is_no_depth_and_no_confidence() {
     let bench = Bench::new(64);

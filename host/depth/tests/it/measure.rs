@@ -23,7 +23,8 @@ struct Pair {
     truth: Array2<f32>,
 }
 
-fn lens() -> Lens {
+/// The lens of [`rig`].
+pub fn lens() -> Lens {
     Lens::from_optics(&OpticsFile::parse(standard::OPTICS).unwrap()).unwrap()
 }
 
@@ -408,18 +409,11 @@ fn nothing_is_confident_outside_the_range() {
 #[test]
 fn a_wrong_psf_is_reported() {
     let pair = plain("staircase", 9);
-    for (psf, reported) in
-        [(PSF, false), ("gaussian:k=0.5036", true), ("pillbox", true), ("generalised:p=1.8,k=0.4802", true)]
-    {
+    // A Gaussian of another width, or a nearly Gaussian PSF, explains a pair of planes as well.
+    for (psf, reported) in [(PSF, false), ("pillbox", true)] {
         let found = measure(&pair, psf, Window::Adaptive).unwrap();
-        println!("{psf}: {:e} {:.3} {:?}", found.left_over, found.excess, found.findings);
-        if !reported {
-            assert!(
-                !found.findings.iter().any(|f| f.to_string().contains("unexplained")),
-                "{psf}: {:?}",
-                found.findings
-            );
-        }
+        let unexplained = found.findings.iter().any(|f| matches!(f, Finding::Unexplained { .. }));
+        assert_eq!(unexplained, reported, "{psf}: {:?}", found.findings);
     }
 }
 
@@ -492,7 +486,7 @@ fn misfit_widens_the_deviation_and_lowers_the_confidence() {
     let [right, wrong] =
         ["pillbox", "gaussian:k=0.7"].map(|psf| measure(&pair, psf, Window::Adaptive).unwrap());
     let [[narrow, sure], [wide, doubtful]] = [claimed(&right), claimed(&wrong)];
-    println!("{narrow} {sure}; {wide} {doubtful}, left over {:.4}", wrong.left_over);
-    assert!(wrong.left_over > 0.005, "{}", wrong.left_over);
+    let large = |f: &Finding| matches!(f, Finding::Unexplained { left_over, .. } if *left_over > 0.005);
+    assert!(wrong.findings.iter().any(large), "{:?}", wrong.findings);
     assert!(wide > 3.0 * narrow && doubtful < sure - 0.02, "{narrow} {sure}; {wide} {doubtful}");
 }

@@ -5,8 +5,7 @@
 use farnear_depth::optics::{Optics, OpticsFile};
 use farnear_scene as scene;
 
-const GOOD: &str = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n\
-                    [focus]\nfar_mm = 933.0\nmax_blur_px = 2.703\n";
+const GOOD: &str = scene::standard::OPTICS;
 
 fn here(text: &str) -> Result<Optics, String> {
     let file: OpticsFile = toml::from_str(text).map_err(|error| error.to_string().trim_end().to_owned())?;

@@ -2,17 +2,17 @@
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
 use crate::common::rig;
+use crate::measure::{PSF, lens};
 use farnear_depth::adaptive_window::Window;
 use farnear_depth::measure::{DepthMethod, MeasureSettings, measure_pair_of_views};
 use farnear_depth::operators::Operators;
 use farnear_depth::prepare::PrepareSettings;
-use farnear_scene::{Camera, Lens, Noise, OpticsFile, Renderer, Scene, View, standard};
+use farnear_scene::{Camera, Noise, Renderer, Scene, View};
 use ndarray::Array2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const SIZE: (usize, usize) = (128, 96);
-const PSF: &str = "gaussian:k=0.4578";
 /// Combinations without `FARNEAR_RANDOM_PLANES`.
 const USUAL: u64 = 24;
 /// Combinations that were wrong along the rim of the resampled near image, along the border of the image, and by the
@@ -34,7 +34,7 @@ fn random_planes_and_magnifications_give_no_confident_wrong_plateau() {
     let count = numbers.clone().count() + before.clone().count();
     let optics = rig(PSF);
     let operators = Operators::for_optics(&optics).unwrap();
-    let lens = Lens::from_optics(&OpticsFile::parse(standard::OPTICS).unwrap()).unwrap();
+    let lens = lens();
     let mut broken: Vec<String> = Vec::new();
     for number in numbers.clone().chain(before) {
         let mut random = ChaCha8Rng::seed_from_u64(number);

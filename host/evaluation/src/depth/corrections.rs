@@ -3,6 +3,7 @@
 use anyhow::{Context, Result};
 use farnear_depth::{
     corrections::{CdcSettings, Correction, Method, Pattern, fit},
+    metrics::Comparison,
     operators::Operators,
     optics::Optics,
 };
@@ -13,7 +14,7 @@ use rayon::prelude::*;
 use crate::{
     chart::{self, Curve},
     page::{Page, mm},
-    panels::{self, Panel, Scale},
+    panels::{self, Scale},
     rig::{self, Exposure},
 };
 
@@ -27,12 +28,6 @@ const SEAMS: [usize; 2] = [213, 426];
 struct Plane {
     true_mm: f64,
     depth_mm: Array2<f32>,
-}
-
-struct PlaneError {
-    true_mm: f64,
-    rmse_mm: f64,
-    bias_mm: f64,
 }
 
 pub fn measure(page: &mut Page) -> Result<()> {
@@ -57,7 +52,7 @@ pub fn measure(page: &mut Page) -> Result<()> {
             .collect::<Result<Vec<_>>>()?;
         let errors = errors(&corrected)?;
         rows.push(row(name, &errors, steps(&corrected)));
-        let points = errors.iter().map(|error| (error.true_mm, error.rmse_mm)).collect();
+        let points = judge.iter().zip(&errors).map(|(plane, error)| (plane.true_mm, error.rmse_mm)).collect();
         curves.push(Curve { name: name.into(), points });
         anyhow::Ok(())
     };
@@ -103,12 +98,8 @@ fn errors_of_the_middle_plane(
             corrections.iter().find(|(name, _)| name == method.name()).context("every method was learned")?;
         maps.push(panel(title, &correction.apply(plane.depth_mm.view())?));
     }
-    let panels: Vec<Panel<'_>> = maps
-        .iter()
-        .map(|(title, map)| Panel { title: title.clone(), map: map.view(), scale: Scale::Error(4.0) })
-        .collect();
     let caption = format!("Error of the held-out plane at {:.2} mm: raw, clsf, clsf-full", plane.true_mm);
-    page.picture("accuracy-distortion.png", &panels::row(&panels)?, &caption)
+    page.picture("accuracy-distortion.png", &panels::titled(maps.len(), &maps, Scale::Error(4.0))?, &caption)
 }
 
 fn planes(depths: &[f64], seed: u64) -> Result<Vec<Plane>> {
@@ -135,11 +126,10 @@ fn undone(map: &Array2<f32>, optics: &Optics) -> Array2<f32> {
     })
 }
 
-fn errors(planes: &[Plane]) -> Result<Vec<PlaneError>> {
+fn errors(planes: &[Plane]) -> Result<Vec<Comparison>> {
     let one = |plane: &Plane| {
         let truth = Array2::from_elem(plane.depth_mm.dim(), plane.true_mm as f32);
-        let error = rig::error(&plane.depth_mm, &truth, false)?;
-        Ok(PlaneError { true_mm: plane.true_mm, rmse_mm: error.rmse_mm, bias_mm: error.bias_mm })
+        rig::error(&plane.depth_mm, &truth, false)
     };
     planes.iter().map(one).collect()
 }
@@ -163,7 +153,7 @@ fn steps(planes: &[Plane]) -> [f64; 2] {
     [(squares / steps.len() as f64).sqrt(), steps.into_iter().fold(0.0, f64::max)]
 }
 
-fn row(name: &str, errors: &[PlaneError], [rms_step, largest_step]: [f64; 2]) -> Vec<String> {
+fn row(name: &str, errors: &[Comparison], [rms_step, largest_step]: [f64; 2]) -> Vec<String> {
     let rmse = (errors.iter().map(|e| e.rmse_mm * e.rmse_mm).sum::<f64>() / errors.len() as f64).sqrt();
     let largest = errors.iter().map(|e| e.rmse_mm).fold(0.0, f64::max);
     let bias = errors.iter().map(|e| e.bias_mm.abs()).fold(0.0, f64::max);

@@ -13,7 +13,7 @@ use farnear_depth::{
 use farnear_files::image_file::read_grey;
 use ndarray::{Array2, s};
 
-use crate::page::Page;
+use crate::page::{Page, median};
 
 /// Binning of the slices, slices between the images of a pair, and the look-up curve's robust error, mm.
 const SETTINGS: [(usize, usize, f64); 4] = [(1, 2, 0.0089), (1, 3, 0.0105), (2, 4, 0.0122), (2, 6, 0.0184)];
@@ -148,15 +148,10 @@ fn judge(slices: &[Array2<f32>], optics: &Optics, truth: &Truth, bin: usize, ste
     }
     let count = sizes.len();
     Ok(Judged {
-        robust_mm: 1.4826 * median(&mut sizes).unwrap_or(f64::NAN),
+        robust_mm: 1.4826 * median(sizes),
         rms_mm: (squares / count as f64).sqrt(),
         fill: count as f64 / total as f64,
         within_three: within as f64 / count as f64,
         scatter: (relative / count as f64).sqrt(),
     })
-}
-
-fn median(values: &mut [f64]) -> Option<f64> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }

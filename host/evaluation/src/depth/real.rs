@@ -14,6 +14,7 @@ use ndarray::{Array2, ArrayView2, s};
 use crate::{
     page::Page,
     panels::{self, Panel, Scale},
+    people::data::Data,
 };
 
 pub const INTRODUCTION: &str = "# Accuracy on real scenes
@@ -21,7 +22,8 @@ pub const INTRODUCTION: &str = "# Accuracy on real scenes
 Written by `cargo xtask evaluate` where the data are available; they are not part of this repository. Accuracy with known truth is in
 [accuracy.md](accuracy.md).";
 
-pub fn measure(page: &mut Page, data: &Path) -> Result<()> {
+pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
+    let data = &data.0;
     let breakfast = data.join("breakfast");
     if breakfast.is_dir() {
         measure_breakfast(page, &breakfast)?;

@@ -14,7 +14,10 @@ use farnear_silhouettes::readers::matlab::{self, Array};
 use ndarray::{Array2, ShapeBuilder, Zip};
 use rayon::prelude::*;
 
-use crate::{page::Page, rig};
+use crate::{
+    page::{Page, median},
+    rig,
+};
 
 const STACK: usize = 30;
 /// Slices at the ends of the working range, the far one first; the stacks run from near to far.
@@ -89,14 +92,7 @@ fn measure_hci(page: &mut Page, folder: &Path) -> Result<()> {
     let mut rows: Vec<Vec<String>> = scenes.iter().map(|scene| row(&scene.name, scene.figures)).collect();
     let column = |at: usize| -> Vec<f64> { scenes.iter().map(|scene| scene.figures[at]).collect() };
     rows.push(row("mean", std::array::from_fn(|at| column(at).iter().sum::<f64>() / scenes.len() as f64)));
-    rows.push(row(
-        "median",
-        std::array::from_fn(|at| {
-            let mut values = column(at);
-            values.sort_by(f64::total_cmp);
-            values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
-        }),
-    ));
+    rows.push(row("median", std::array::from_fn(|at| median(column(at)))));
     page.table(
         1,
         &[

@@ -13,7 +13,7 @@ use farnear_recognition::self_training::ROUNDS;
 use farnear_recognition::space::SpaceSettings;
 use farnear_recognition::watch::Unwatched;
 
-use super::{data::Data, sets};
+use super::{data::Data, everyday::MODELS, sets};
 use crate::page::Page;
 
 /// Equal activities with different names.
@@ -58,25 +58,9 @@ const WAYS: [Way; 6] = [
     },
 ];
 
-/// Mode, its name, and its network for full frames and for 100x100.
-const MODES: [(Mode, &str, [&[u8]; 2]); 2] = [
-    (
-        Mode::Ordered,
-        "ordered",
-        [
-            include_bytes!("../../../recognition/models/everyday.fnm"),
-            include_bytes!("../../../recognition/models/everyday-cut-out.fnm"),
-        ],
-    ),
-    (
-        Mode::OrderFree,
-        "order-free",
-        [
-            include_bytes!("../../../recognition/models/everyday-order-free.fnm"),
-            include_bytes!("../../../recognition/models/everyday-order-free-cut-out.fnm"),
-        ],
-    ),
-];
+/// Mode, and whether silhouettes are cut out, of each of [`MODELS`].
+const KINDS: [(Mode, bool); 4] =
+    [(Mode::Ordered, false), (Mode::Ordered, true), (Mode::OrderFree, false), (Mode::OrderFree, true)];
 
 pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
     page.heading("From one set to another");
@@ -94,17 +78,14 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
     let pairs = pairs(&utkinect.clips, &florence.clips, &strips.clips);
     let mut rows = Vec::new();
     for pair in &pairs {
-        for (mode, mode_name, networks) in MODES {
-            for (cut_out, kind) in [(false, "full frames"), (true, "100x100")] {
-                let network = networks[usize::from(cut_out)];
-                let mut row = vec![pair.name.to_owned(), mode_name.to_owned(), kind.to_owned()];
-                for way in &WAYS {
-                    eprintln!("    {}, {mode_name}, {kind}, {}", pair.name, way.name);
-                    row.push(accuracy(pair, mode, cut_out, network, way)?);
-                }
-                row.push(pair.asked[usize::from(mode == Mode::Ordered)].to_owned());
-                rows.push(row);
+        for ((mode, cut_out), (mode_name, kind, network)) in KINDS.into_iter().zip(MODELS) {
+            let mut row = vec![pair.name.to_owned(), mode_name.to_owned(), kind.to_owned()];
+            for way in &WAYS {
+                eprintln!("    {}, {mode_name}, {kind}, {}", pair.name, way.name);
+                row.push(accuracy(pair, mode, cut_out, network, way)?);
             }
+            row.push(pair.asked[usize::from(mode == Mode::Ordered)].to_owned());
+            rows.push(row);
         }
     }
     let mut head = vec!["sets", "mode", "silhouettes"];
@@ -147,7 +128,8 @@ fn common(clips: &[Clip], activities: &[&str], same: &[(&str, &str)]) -> Vec<Cli
     named.filter(|clip| activities.contains(&clip.activity.as_str())).collect()
 }
 
-fn apart(clips: &[Clip]) -> Vec<Clip> {
+/// Views as clips of their own.
+pub fn apart(clips: &[Clip]) -> Vec<Clip> {
     clips
         .iter()
         .flat_map(|clip| clip.views.iter().map(|view| Clip { views: vec![view.clone()], ..clip.clone() }))

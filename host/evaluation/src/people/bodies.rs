@@ -15,7 +15,7 @@ use ndarray::Array2;
 use super::{data::Data, sets::RATE_HZ};
 use crate::{
     page::Page,
-    panels::{self, Panel, Scale},
+    panels::{self, Scale},
 };
 
 const VIEWS: usize = 8;
@@ -36,19 +36,6 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
 
 fn grey(mask: &Mask) -> Array2<f32> {
     mask.mapv(|set| if set { 0.0 } else { 1.0 })
-}
-
-fn picture(
-    page: &mut Page,
-    name: &str,
-    across: usize,
-    maps: &[(String, Array2<f32>)],
-    about: &str,
-) -> Result<()> {
-    let scale = Scale::Grey(1.0);
-    let shown: Vec<Panel<'_>> =
-        maps.iter().map(|(title, map)| Panel { title: title.clone(), map: map.view(), scale }).collect();
-    page.picture(name, &panels::grid(across, &shown)?, about)
 }
 
 /// Fig. 7.6: markers, projected hulls, silhouettes, from four sides.
@@ -80,11 +67,9 @@ fn from_markers(page: &mut Page, data: &Data) -> Result<()> {
         whole.push(("silhouette".to_owned(), grey(&closed)));
     }
     let maps: Vec<_> = dots.into_iter().chain(hulls).chain(whole).collect();
-    picture(
-        page,
+    page.picture(
         "thesis-markers.png",
-        sides.len(),
-        &maps,
+        &panels::titled(sides.len(), &maps, Scale::Grey(1.0))?,
         "Silhouettes from markers, fig. 7.6: markers, projected hulls of the body's parts, silhouettes after closing, from four sides",
     )?;
     page.paragraph(&format!(
@@ -106,11 +91,9 @@ fn from_eight_sides(page: &mut Page) -> Result<()> {
             maps.push((title, grey(&cut_out)));
         }
     }
-    picture(
-        page,
+    page.picture(
         "thesis-views.png",
-        VIEWS,
-        &maps,
+        &panels::titled(VIEWS, &maps, Scale::Grey(1.0))?,
         "Ten activities from eight sides, 45 deg apart, fig. 7.10: a row per activity, the middle of one synthetic person's performance",
     )?;
     page.paragraph(

@@ -15,6 +15,7 @@ use farnear_silhouettes::mask::{
 use rayon::prelude::*;
 
 use super::{
+    between::apart,
     data::{Data, numbered_files},
     sets::RATE_HZ,
 };
@@ -132,17 +133,7 @@ fn read(folder: &std::path::Path, person: &str) -> Result<Vec<Passage>> {
 
 fn row(name: &str, mode: Mode, passages: &[Passage]) -> Result<Vec<String>> {
     // Views become performances: the video has one view from an unknown side.
-    let people: Vec<Clip> = clips(TEACHERS[0], TEACHERS[1], RATE_HZ, Scaling::default())
-        .into_iter()
-        .flat_map(|clip| {
-            let Clip { subject, activity, views } = clip;
-            views.into_iter().map(move |view| Clip {
-                subject: subject.clone(),
-                activity: activity.clone(),
-                views: vec![view],
-            })
-        })
-        .collect();
+    let people = apart(&clips(TEACHERS[0], TEACHERS[1], RATE_HZ, Scaling::default()));
     let settings = RecogniserSettings {
         space: SpaceSettings { mode, ..SpaceSettings::default() },
         ..RecogniserSettings::default()
@@ -157,8 +148,7 @@ fn row(name: &str, mode: Mode, passages: &[Passage]) -> Result<Vec<String>> {
             (0..frames).map(|n| passage.masks[(n as f64 * step) as usize].clone()).collect();
         let track = Track::from_masks(&masks, Scaling::default(), true);
         let answer = recogniser.recognise(&[track]).with_context(|| passage.person.clone())?;
-        let best =
-            answer.probabilities.iter().max_by(|a, b| a.1.total_cmp(&b.1)).map_or("", |best| best.0.as_str());
+        let best = answer.best().map_or("", String::as_str);
         walk += usize::from(best == "walk");
         walk_or_bag += usize::from(matches!(best, "walk" | "bag"));
         unknown += usize::from(answer.activity.is_none());

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
+use image::{DynamicImage, ImageReader};
 
 /// The folder may not exist.
 pub struct Data(pub PathBuf);
@@ -37,6 +38,12 @@ pub fn numbered_files(folder: &Path) -> Result<Vec<(u64, PathBuf)>> {
     }
     files.sort();
     Ok(files)
+}
+
+/// Some files have another format's extension.
+pub fn picture(path: &Path) -> Result<DynamicImage> {
+    let reader = ImageReader::open(path).with_context(|| format!("cannot read {}", path.display()))?;
+    reader.with_guessed_format()?.decode().with_context(|| format!("cannot decode {}", path.display()))
 }
 
 #[cfg(test)]

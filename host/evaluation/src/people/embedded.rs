@@ -55,11 +55,9 @@ pub fn measure(page: &mut Page) -> Result<()> {
     for name in SHOWN {
         maps.push((format!("{name}: {MEMBERS} x {MEMBERS}"), object(&embedded, &objects[place(name)?])));
     }
-    let shown: Vec<Panel<'_>> =
-        maps.iter().map(|(title, map)| Panel { title: title.clone(), map: map.view(), scale }).collect();
     page.picture(
         "thesis-objects.png",
-        &panels::grid(SHOWN.len(), &shown)?,
+        &panels::titled(SHOWN.len(), &maps, scale)?,
         "Patterns of embedded silhouettes of six activities, fig. 9.5 (above), and the spatial objects made of them, fig. 9.6 (below); all silhouettes in grey",
     )?;
     summary(page, &embedded, &objects);

@@ -18,11 +18,11 @@ use farnear_recognition::watch::Unwatched;
 use ndarray::Axis;
 use rayon::prelude::*;
 
-use super::{broken, data::Data, sets};
+use super::{broken, data::Data, recognition::accuracy, sets};
 use crate::page::Page;
 
 /// Mode, kind of silhouettes, and the model.
-const MODELS: [(&str, &str, &[u8]); 4] = [
+pub const MODELS: [(&str, &str, &[u8]); 4] = [
     ("ordered", "full frames", include_bytes!("../../../recognition/models/everyday.fnm")),
     ("ordered", "100x100", include_bytes!("../../../recognition/models/everyday-cut-out.fnm")),
     ("order-free", "full frames", include_bytes!("../../../recognition/models/everyday-order-free.fnm")),
@@ -207,11 +207,8 @@ fn row(model: &Recogniser, names: [&str; 3], clips: &[Clip]) -> Result<Vec<Strin
     }
     let unknown = each.iter().filter(|judged| judged.answer.outlier_score > 1.0).count();
     let share = |count: usize, of: usize| format!("{:.1}", 100.0 * count as f64 / of.max(1) as f64);
-    let with_interval = |confusion: &Confusion| {
-        // Views are not independent: as many trials as clips.
-        let (low, high) = confusion.interval(clips.len() as u32);
-        format!("{:.1} ({:.1} to {:.1})", 100.0 * confusion.accuracy(), 100.0 * low, 100.0 * high)
-    };
+    // Views are not independent: as many trials as clips.
+    let with_interval = |confusion: &Confusion| accuracy(confusion, clips.len());
     let mut cells: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
     cells.extend([
         among.len().to_string(),

@@ -17,7 +17,7 @@ use ndarray::Array2;
 use crate::{
     chart::{self, Curve, Plot},
     page::Page,
-    panels::{self, Panel, Scale},
+    panels::{self, Scale},
 };
 
 const PERSON: f32 = 0.0;
@@ -70,13 +70,10 @@ pub fn shadows_off(page: &mut Page, scenes: u64) -> Result<()> {
             .with_context(|| format!("scene {seed}"))?;
         maps.push(("hybrid".into(), cut_out(&of_mask(&left), scene, size)));
     }
-    let scale = Scale::Grey(1.0);
-    let shown: Vec<Panel<'_>> =
-        maps.iter().map(|(title, map)| Panel { title: title.clone(), map: map.view(), scale }).collect();
     let across = maps.len() / drawn.len().max(1);
     page.picture(
         "thesis-shadows.png",
-        &panels::grid(across, &shown)?,
+        &panels::titled(across, &maps, Scale::Grey(1.0))?,
         "Shadow off, fig. 8.6: a row per scene; the truth (person black, shadow grey), then the result by chromaticity, physical model, geometry, small and large regions' texture, and `hybrid`",
     )
 }

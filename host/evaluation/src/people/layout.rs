@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use farnear_recognition::embedding::{
-    descriptor::Scaling, isomap::isomap, landmark::landmark_isomap, neighbours::Neighbourhood, pca::Pca,
+    descriptor::Scaling, isomap::isomap, landmark::landmark_isomap, pca::Pca,
 };
 use farnear_recognition::synthetic::activities::clips;
 use ndarray::{Array2, ArrayView2, Axis, concatenate};
@@ -61,7 +61,7 @@ pub fn measure(page: &mut Page) -> Result<()> {
 }
 
 fn layouts(gallery: ArrayView2<f32>) -> Result<Vec<(String, Vec<f64>)>> {
-    let whole = isomap(gallery, Neighbourhood::Nearest(NEIGHBOURS), DIMENSIONS)?;
+    let whole = isomap(gallery, NEIGHBOURS, DIMENSIONS)?;
     let principal = Pca::fit(gallery, DIMENSIONS)?.transform(gallery)?;
     let paths = &whole.geodesics;
     let mut found = vec![
@@ -70,7 +70,7 @@ fn layouts(gallery: ArrayView2<f32>) -> Result<Vec<(String, Vec<f64>)>> {
         ("PCA, path lengths".to_owned(), residuals(principal.view(), paths)),
     ];
     for count in LANDMARKS {
-        let laid_out = landmark_isomap(gallery, Neighbourhood::Nearest(NEIGHBOURS), count, DIMENSIONS)?;
+        let laid_out = landmark_isomap(gallery, NEIGHBOURS, count, DIMENSIONS)?;
         let name = format!("landmark Isomap, {count} landmarks, path lengths");
         found.push((name, residuals(laid_out.coordinates.view(), paths)));
     }

@@ -1,13 +1,13 @@
 //! Confusion matrices as PNG: rows are true activities, columns answers, in per cent of the row.
 
-use anyhow::{Result, anyhow};
+use anyhow::Result;
 use farnear_recognition::evaluation::confusion::Confusion;
 use plotters::{
     prelude::*,
     style::text_anchor::{HPos, Pos, VPos},
 };
 
-use crate::panels;
+use crate::chart::{Area, Drawn, draw_to_png};
 
 const CELL_PX: i32 = 46;
 const NAMES_PX: i32 = 118;
@@ -20,27 +20,17 @@ pub fn pictures(matrices: &[(&str, &Confusion)]) -> Result<Vec<u8>> {
     let height =
         matrices.iter().map(|(_, confusion)| side(confusion)).max().unwrap_or(0) + TITLE_PX + MARGIN_PX;
     let size = (widths.iter().sum::<i32>() as u32, height as u32);
-    let mut buffer = vec![255_u8; 3 * (size.0 * size.1) as usize];
-    {
-        let area = BitMapBackend::with_buffer(&mut buffer, size).into_drawing_area();
+    draw_to_png(size, "confusion matrices", |area| {
         let mut left = 0;
         for ((title, confusion), width) in matrices.iter().zip(&widths) {
-            draw(&area, left, title, confusion).map_err(|error| anyhow!("cannot draw {title:?}: {error}"))?;
+            draw(area, left, title, confusion)?;
             left += width;
         }
-        area.present().map_err(|error| anyhow!("cannot draw: {error}"))?;
-    }
-    panels::encode(&buffer, size)
+        Ok(())
+    })
 }
 
-type Area<'a> = DrawingArea<BitMapBackend<'a>, plotters::coord::Shift>;
-
-fn draw(
-    area: &Area<'_>,
-    left: i32,
-    title: &str,
-    confusion: &Confusion,
-) -> Result<(), Box<dyn std::error::Error>> {
+fn draw(area: &Area<'_>, left: i32, title: &str, confusion: &Confusion) -> Drawn {
     let text = |size: i32, colour: RGBColor, horizontal: HPos| {
         ("sans-serif", size).into_font().color(&colour).pos(Pos::new(horizontal, VPos::Center))
     };

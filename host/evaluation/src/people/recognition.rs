@@ -113,7 +113,7 @@ fn measure_set(page: &mut Page, set: &Set) -> Result<()> {
         .iter()
         .map(|method| {
             eprintln!("    {}, {}", method.name, method.classifier);
-            let outcome = leave_one_subject_out(&set.clips, &method.experiment(set), Clone::clone)?;
+            let outcome = leave_one_subject_out(&set.clips, &method.experiment(set))?;
             Ok((*method, outcome))
         })
         .collect::<Result<Vec<(Method, Outcome)>>>()?;
@@ -126,10 +126,10 @@ fn measure_set(page: &mut Page, set: &Set) -> Result<()> {
         .map(|(method, outcome)| {
             let asked = method.asked(set).map(|a| a.map_or_else(|| "-".into(), |a| format!("{a:.0}")));
             let [one, several] = asked;
-            let mut row =
-                vec![method.name.into(), method.classifier.into(), accuracy(&outcome.each, set), one];
+            let each = accuracy(&outcome.each, set.trials());
+            let mut row = vec![method.name.into(), method.classifier.into(), each, one];
             if views > 1 {
-                row.extend([accuracy(&outcome.fused, set), several]);
+                row.extend([accuracy(&outcome.fused, set.trials()), several]);
             }
             row
         })
@@ -153,13 +153,8 @@ fn measure_set(page: &mut Page, set: &Set) -> Result<()> {
     Ok(())
 }
 
-fn accuracy(confusion: &Confusion, set: &Set) -> String {
-    let (low, high) = interval(confusion, set);
+/// Per cent, with the interval for as many independent trials.
+pub fn accuracy(confusion: &Confusion, trials: usize) -> String {
+    let (low, high) = confusion.interval(trials as u32);
     format!("{:.1} ({:.1} to {:.1})", 100.0 * confusion.accuracy(), 100.0 * low, 100.0 * high)
-}
-
-fn interval(confusion: &Confusion, set: &Set) -> (f64, f64) {
-    // A set with its mirrors has every performance twice.
-    let trials = set.clips.len() / if set.mirror { 1 } else { 2 };
-    confusion.interval(trials as u32)
 }

@@ -1,9 +1,8 @@
 //! Effect of shuffled frames, other speeds and bad masks on synthetic people; the first two also on measured
 //! joints. Per left-out subject a recogniser trained on the others' clean clips answers all changed copies (defaults).
 
-use std::collections::BTreeSet;
-
 use anyhow::Result;
+use farnear_recognition::choice::names;
 use farnear_recognition::clip::{Clip, Track};
 use farnear_recognition::embedding::descriptor::Scaling;
 use farnear_recognition::evaluation::confusion::Confusion;
@@ -124,10 +123,8 @@ fn accuracies(mode: Mode, sets: &[Vec<Clip>]) -> Result<Vec<Confusion>> {
         space: SpaceSettings { mode, ..SpaceSettings::default() },
         ..RecogniserSettings::default()
     };
-    let names = |name: fn(&Clip) -> &String| -> Vec<String> {
-        sets[0].iter().map(name).collect::<BTreeSet<_>>().into_iter().cloned().collect()
-    };
-    let (classes, subjects) = (names(|clip| &clip.activity), names(|clip| &clip.subject));
+    let classes = names(sets[0].iter().map(|clip| &clip.activity));
+    let subjects = names(sets[0].iter().map(|clip| &clip.subject));
     let folds = subjects
         .par_iter()
         .map(|left_out| {
@@ -139,9 +136,9 @@ fn accuracies(mode: Mode, sets: &[Vec<Clip>]) -> Result<Vec<Confusion>> {
                     let mut confusion = Confusion::new(classes.clone());
                     for clip in set.iter().filter(of) {
                         let answer = recogniser.recognise(&clip.views)?;
-                        let best = answer.probabilities.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-                        let place = |name: &str| classes.iter().position(|class| class == name).unwrap_or(0);
-                        confusion.count(place(&clip.activity), best.map_or(0, |best| place(&best.0)));
+                        let place =
+                            |name: &String| classes.iter().position(|class| class == name).unwrap_or(0);
+                        confusion.count(place(&clip.activity), answer.best().map_or(0, place));
                     }
                     Ok(confusion)
                 })

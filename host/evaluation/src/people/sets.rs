@@ -4,6 +4,9 @@ use anyhow::Result;
 use farnear_recognition::clip::{Clip, Track};
 use farnear_recognition::embedding::descriptor::Scaling;
 use farnear_recognition::synthetic::activities;
+use farnear_silhouettes::readers::skeletons::{
+    FLORENCE_15, FLORENCE_ACTIVITIES, KINECT_20, UTKINECT_ACTIVITIES,
+};
 use rayon::prelude::*;
 
 use super::{
@@ -27,6 +30,13 @@ pub struct Set {
     pub asked: [Option<f64>; 4],
 }
 
+impl Set {
+    /// A set with its mirrors has every performance twice.
+    pub fn trials(&self) -> usize {
+        self.clips.len() / if self.mirror { 1 } else { 2 }
+    }
+}
+
 pub type Read = fn(&Data) -> Result<Option<Set>>;
 
 /// Ten activities from a depth sensor's joints.
@@ -37,7 +47,7 @@ pub fn utkinect(data: &Data) -> Result<Option<Set>> {
         short: "utkinect",
         about: "UTKinect-Action3D (Xia et al. 2012): 10 activities, 10 subjects, two repetitions; measured joints dressed with capsules and drawn from \
                 four views, 90 deg apart.",
-        clips: skeletons::utkinect(&bytes, VIEWS, Scaling::default())?,
+        clips: skeletons::clips(&bytes, &KINECT_20, &UTKINECT_ACTIVITIES)?,
         mirror: true,
         asked: [Some(74.0), Some(84.0), Some(84.0), Some(93.0)],
     }))
@@ -49,7 +59,7 @@ pub fn florence(data: &Data) -> Result<Option<Set>> {
         name: "Florence",
         short: "florence",
         about: "Florence 3D Actions (Seidenari et al. 2013): 9 activities, 10 subjects; measured joints dressed and drawn likewise.",
-        clips: skeletons::florence(&bytes, VIEWS, Scaling::default())?,
+        clips: skeletons::clips(&bytes, &FLORENCE_15, &FLORENCE_ACTIVITIES)?,
         mirror: true,
         asked: [Some(70.0), Some(79.0), Some(77.0), Some(85.0)],
     }))

@@ -10,12 +10,11 @@ use farnear_shadow::synthetic::{
     scene::{Kind, scene},
 };
 use farnear_silhouettes::background::{BackgroundModel, Frame, Label, Settings};
-use image::DynamicImage;
 use ndarray::{Array2, ArrayView3};
 use rayon::prelude::*;
 use std::path::Path;
 
-use super::data::{Data, numbered_files};
+use super::data::{self, Data, numbered_files};
 use crate::page::Page;
 
 const SCENES: u64 = 100;
@@ -28,6 +27,7 @@ const KINDS: [(&str, Kind); 4] = [
     ("bending by 40 to 80 deg", Kind::Bending),
     ("shadow behind the person", Kind::Behind),
 ];
+const CUTTERS: [(&str, Cutter); 2] = [("`thesis`", Cutter::Thesis), ("`hybrid`", Cutter::Hybrid)];
 const HEAD: [&str; 5] = ["scenes", "method", "shadow removed, %", "subject wrongly removed, %", "IoU, %"];
 
 pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
@@ -40,8 +40,8 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
     ));
     let mut rows = Vec::new();
     for (name, kind) in KINDS {
-        for (method, cutter) in [("`thesis`", Cutter::Thesis), ("`hybrid`", Cutter::Hybrid)] {
-            rows.push(row(name, method, &cut(kind, cutter)?));
+        for (method, cutter) in CUTTERS {
+            rows.push(row(name, method, &pooled(kind, cutter, 0..SCENES)?));
         }
     }
     page.table(2, &HEAD, &rows);
@@ -50,18 +50,16 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
     page.paragraph(&format!(
         "The detectors that Li (2014) compares with, on {MADE_SCENES} of the same scenes coloured in (paving, clothes, sun and sky of different colour, camera noise), compared with the geometric cutters on the same masks. Where there is colour it is the better cue; the cutters need a mask, the sun and the camera's place only."
     ));
-    let mut rows = Vec::new();
-    for (name, kind) in KINDS.into_iter().take(1) {
-        let scores = Method::ALL
-            .par_iter()
-            .map(|&method| detected(kind, method, 0..MADE_SCENES))
-            .collect::<Result<Vec<_>>>()?;
-        for (method, score) in Method::ALL.iter().zip(&scores) {
-            rows.push(row(name, &format!("`{}`", method.name()), score));
-        }
-        for (method, cutter) in [("`thesis`", Cutter::Thesis), ("`hybrid`", Cutter::Hybrid)] {
-            rows.push(row(name, method, &pooled(kind, cutter, 0..MADE_SCENES)?));
-        }
+    let (name, kind) = KINDS[0];
+    let mut rows = Method::ALL
+        .par_iter()
+        .map(|&method| {
+            let score = detected(kind, method, 0..MADE_SCENES)?;
+            Ok(row(name, &format!("`{}`", method.name()), &score))
+        })
+        .collect::<Result<Vec<_>>>()?;
+    for (method, cutter) in CUTTERS {
+        rows.push(row(name, method, &pooled(kind, cutter, 0..MADE_SCENES)?));
     }
     page.table(2, &HEAD, &rows);
 
@@ -78,10 +76,6 @@ fn row(scenes: &str, method: &str, score: &ShadowScore) -> Vec<String> {
     let figures = [score.removed_percent(), score.wrongly_removed_percent(), score.iou_percent()];
     let figures = figures.map(|value| value.map_or_else(|| "-".into(), |value| format!("{value:.1}")));
     [scenes.to_owned(), method.to_owned()].into_iter().chain(figures).collect()
-}
-
-fn cut(kind: Kind, cutter: Cutter) -> Result<ShadowScore> {
-    pooled(kind, cutter, 0..SCENES)
 }
 
 fn pooled(kind: Kind, cutter: Cutter, seeds: std::ops::Range<u64>) -> Result<ShadowScore> {
@@ -143,7 +137,7 @@ fn highway(page: &mut Page, folder: &Path) -> Result<()> {
     let (mut learner, mut separate): (Option<BackgroundModel>, Option<BackgroundModel>) = (None, None);
     let mut scored = 0;
     for (number, path) in numbered_files(&folder.join("input"))? {
-        let picture = open(&path)?;
+        let picture = data::picture(&path)?;
         let size = (picture.height() as usize, picture.width() as usize);
         let rgb = picture.to_rgb8();
         let pixels = ArrayView3::from_shape((size.0, size.1, 3), rgb.as_raw())?;
@@ -156,7 +150,7 @@ fn highway(page: &mut Page, folder: &Path) -> Result<()> {
         if number < 470 || !truth_path.exists() {
             continue;
         }
-        let truth = open(&truth_path)?.to_luma8();
+        let truth = data::picture(&truth_path)?.to_luma8();
         let truth: Vec<Truth> = truth
             .pixels()
             .map(|pixel| {
@@ -202,10 +196,4 @@ fn ready<'a>(
         *model = Some(BackgroundModel::like(frame, settings)?);
     }
     model.as_mut().context("the model was just made")
-}
-
-fn open(path: &Path) -> Result<DynamicImage> {
-    // Some files have another format's extension.
-    let reader = image::ImageReader::open(path).with_context(|| format!("cannot read {}", path.display()))?;
-    reader.with_guessed_format()?.decode().with_context(|| format!("cannot decode {}", path.display()))
 }

@@ -2,30 +2,15 @@
 
 use farnear_recognition::clip::{Clip, Track};
 use farnear_recognition::embedding::descriptor::Scaling;
-use farnear_silhouettes::readers::skeletons::{
-    FLORENCE_15, FLORENCE_ACTIVITIES, KINECT_20, Layout, SkeletonClip, SkeletonError, UTKINECT_ACTIVITIES,
-    dress, read_cells,
-};
+use farnear_silhouettes::readers::skeletons::{Layout, SkeletonError, dress, read_cells};
 use farnear_silhouettes::silhouette::{capsule::Capsule, view::views_round};
 use rayon::prelude::*;
 
-pub fn utkinect(bytes: &[u8], views: usize, scaling: Scaling) -> Result<Vec<Clip>, SkeletonError> {
-    Ok(from_skeletons(&read_cells(bytes, &KINECT_20)?, &KINECT_20, &UTKINECT_ACTIVITIES, views, scaling))
-}
-
-pub fn florence(bytes: &[u8], views: usize, scaling: Scaling) -> Result<Vec<Clip>, SkeletonError> {
-    Ok(from_skeletons(&read_cells(bytes, &FLORENCE_15)?, &FLORENCE_15, &FLORENCE_ACTIVITIES, views, scaling))
-}
+use super::sets::VIEWS;
 
 /// Views at equal steps, the first from the sensor's side.
-fn from_skeletons(
-    clips: &[SkeletonClip],
-    layout: &Layout,
-    activities: &[&str],
-    views: usize,
-    scaling: Scaling,
-) -> Vec<Clip> {
-    clips
+pub fn clips(bytes: &[u8], layout: &Layout, activities: &[&str]) -> Result<Vec<Clip>, SkeletonError> {
+    let clips = read_cells(bytes, layout)?
         .par_iter()
         .map(|clip| {
             let bodies: Vec<Vec<Capsule>> = clip.frames.iter().map(|joints| dress(joints, layout)).collect();
@@ -34,11 +19,12 @@ fn from_skeletons(
                 activity: activities
                     .get(clip.activity)
                     .map_or_else(|| clip.activity.to_string(), |a| (*a).to_owned()),
-                views: views_round(views, 0.0)
+                views: views_round(VIEWS, 0.0)
                     .iter()
-                    .map(|view| Track::from_bodies(&bodies, view, scaling))
+                    .map(|view| Track::from_bodies(&bodies, view, Scaling::default()))
                     .collect(),
             }
         })
-        .collect()
+        .collect();
+    Ok(clips)
 }

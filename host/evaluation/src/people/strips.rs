@@ -2,7 +2,7 @@
 //! The wall's colours in a row are those of the columns at both edges over the whole strip, as one Gaussian;
 //! pixels far from it are the person. Moving pixels need less evidence.
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 use farnear_silhouettes::mask::{
     Mask,
     bits::BitMask,
@@ -10,6 +10,9 @@ use farnear_silhouettes::mask::{
 };
 use image::RgbImage;
 use std::path::Path;
+
+use super::data::picture;
+use crate::page::median;
 
 pub const SIDE: usize = 64;
 /// Columns of wall at either edge.
@@ -27,11 +30,7 @@ const MOVING: f64 = 40.0;
 
 /// Frames in a row; the file extension is ignored.
 pub fn read(path: &Path) -> Result<Vec<RgbImage>> {
-    let reader = image::ImageReader::open(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let strip = reader
-        .with_guessed_format()?
-        .decode()
-        .with_context(|| format!("cannot decode {}", path.display()))?;
+    let strip = picture(path)?;
     let (width, height) = (strip.width() as usize, strip.height() as usize);
     ensure!(
         height == SIDE && width >= SIDE && width % SIDE == 0,
@@ -82,11 +81,6 @@ fn inverse(m: &[Colour; 3]) -> [Colour; 3] {
     };
     let determinant: f64 = (0..3).map(|j| m[0][j] * cofactor(0, j)).sum();
     std::array::from_fn(|i| std::array::from_fn(|j| cofactor(j, i) / determinant))
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 pub fn masks(frames: &[RgbImage]) -> Vec<Mask> {

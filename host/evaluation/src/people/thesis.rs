@@ -11,6 +11,7 @@ use super::{
     bodies, broken,
     data::Data,
     embedded, figures,
+    recognition::accuracy,
     sets::{self, Set},
     shadows,
 };
@@ -144,7 +145,7 @@ fn compared(page: &mut Page, set: &Set, thesis: &[(&str, f64)], thesis_mean: f64
         ..Experiment::codebook(SpaceSettings { mode, ..SpaceSettings::default() }).fixed()
     };
     let run = |experiment: &Experiment| -> Result<Confusion> {
-        Ok(leave_one_subject_out(&set.clips, experiment, Clone::clone)?.each)
+        Ok(leave_one_subject_out(&set.clips, experiment)?.each)
     };
     let columns = [
         ("thesis' method, tuned", run(&Experiment { mirror: false, ..tuned(&GAMMAS) })?),
@@ -163,12 +164,8 @@ fn compared(page: &mut Page, set: &Set, thesis: &[(&str, f64)], thesis_mean: f64
             row
         })
         .collect();
-    let trials = (set.clips.len() / if set.mirror { 1 } else { 2 }) as u32;
     let mut last = vec!["all".to_owned(), format!("{thesis_mean:.1}")];
-    last.extend(columns.iter().map(|(_, confusion)| {
-        let (low, high) = confusion.interval(trials);
-        format!("{:.1} ({:.1} to {:.1})", 100.0 * confusion.accuracy(), 100.0 * low, 100.0 * high)
-    }));
+    last.extend(columns.iter().map(|(_, confusion)| accuracy(confusion, set.trials())));
     rows.push(last);
     let mut head = vec!["activity", "thesis, %"];
     head.extend(columns.iter().map(|(name, _)| *name));

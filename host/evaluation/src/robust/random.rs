@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::disturb::{Disturbance, PSF, WAYS, take};
 use crate::{
-    page::{Page, mm},
+    page::{Page, median, mm},
     rig,
 };
 
@@ -93,6 +93,8 @@ pub fn measure(page: &mut Page) -> Result<()> {
         .map(|seed| case(seed, &operators, &optics))
         .collect::<Result<Vec<_>>>()?;
     let part = |wanted: &dyn Fn(&Case) -> bool| cases.iter().filter(|case| wanted(case)).count();
+    let middle =
+        |of: fn(&Case) -> f64| median(cases.iter().map(of).filter(|value| value.is_finite()).collect());
     let silent: Vec<&Case> = cases.iter().filter(|case| case.silent()).collect();
     page.paragraph(&format!(
         "{COMBINATIONS} pairs of {} x {} px (staircase, slant, cone or a plane), each disturbance with a probability of a third, from the seeds {SEED} on. By the \
@@ -104,8 +106,8 @@ pub fn measure(page: &mut Page) -> Result<()> {
         part(&|case| case.error_mm > SILENT_MM),
         silent.len(),
         part(&|case| case.refused),
-        mm(median(cases.iter().map(|case| case.before_mm))),
-        mm(median(cases.iter().map(|case| case.error_mm))),
+        mm(middle(|case| case.before_mm)),
+        mm(middle(|case| case.error_mm)),
     ));
     let mut worst: Vec<&Case> = cases.iter().filter(|case| case.error_mm.is_finite()).collect();
     worst.sort_by(|a, b| b.error_mm.total_cmp(&a.error_mm));
@@ -124,12 +126,6 @@ pub fn measure(page: &mut Page) -> Result<()> {
         .collect();
     page.table(2, &["seed", "disturbances", "before", "after", "valid", "said"], &rows);
     Ok(())
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.filter(|v| v.is_finite()).collect();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 fn case(seed: u64, operators: &Operators, optics: &Optics) -> Result<Case> {

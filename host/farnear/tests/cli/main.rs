@@ -22,6 +22,7 @@ mod emulated_work;
 mod focus_stack;
 mod half_mirror;
 mod hints;
+mod interrupted;
 mod lens_choice;
 mod light;
 mod maps;

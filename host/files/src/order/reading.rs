@@ -3,10 +3,11 @@
 use std::{
     cmp::Ordering,
     collections::{BTreeSet, HashMap},
-    path::{Path, PathBuf},
+    path::PathBuf,
 };
 
 use super::{
+    file_name,
     name::{Name, Number, last_varying},
     natural,
 };
@@ -94,7 +95,7 @@ pub fn ambiguity(sorted: &[PathBuf]) -> Option<String> {
     let numbers = column_of(&names, column);
     if may_be_thousands(&numbers) {
         let at = numbers.iter().position(|number| number.fraction().is_some())?;
-        let (name, value) = (file(&sorted[at]), &understood[at].numbers[column].text);
+        let (name, value) = (file_name(&sorted[at]), &understood[at].numbers[column].text);
         let otherwise = match value.contains('.') {
             true => "are counts, write them without separators of thousands",
             false => "are decimals, write all with as many decimals",
@@ -105,8 +106,8 @@ pub fn ambiguity(sorted: &[PathBuf]) -> Option<String> {
         format!(
             "the names, {} to {}, may number the places of a grid: the images count as one series in the order of these numbers; if they \
              show several places, move those of one place into a folder and give that",
-            file(&sorted[0]),
-            file(&sorted[sorted.len() - 1])
+            file_name(&sorted[0]),
+            file_name(&sorted[sorted.len() - 1])
         )
     })
 }
@@ -127,10 +128,6 @@ pub fn same_number(paths: &[PathBuf]) -> Option<[&PathBuf; 2]> {
         let has_numbers = !numbers.is_empty();
         seen.insert((name.texts.clone(), numbers), path).filter(|_| has_numbers).map(|other| [other, path])
     })
-}
-
-fn file(path: &Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 impl Values {

@@ -62,8 +62,7 @@ pub(super) fn images(path: &Path) -> Result<Series, StackError> {
         return Err(mixed);
     }
     if let Some([before, after]) = order::counter_started_again(&series.images) {
-        let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let (after, before) = (name(after), name(before));
+        let (after, before) = (order::file_name(after), order::file_name(before));
         series.remarks.push(format!("the camera's counter started again: {after} follows {before}"));
     }
     Ok(series)

@@ -7,7 +7,7 @@ use std::{
 
 use super::positions::unit_um;
 use crate::order::{
-    self,
+    self, file_name,
     name::{Name, Number, last_varying},
 };
 
@@ -47,7 +47,7 @@ impl Series {
             let remarks = Vec::from_iter((images.len() > 1).then(|| {
                 format!(
                     "the names have no numbers: the images, {} first, are in alphabetical order",
-                    file(&images[0])
+                    file_name(&images[0])
                 )
             }));
             return Ok(Self { images, remarks, pattern: None });
@@ -98,13 +98,13 @@ impl Series {
             ));
         }
         if let Some(bare) = bare {
-            remarks.push(format!("{} has no number: it counts as the first image", file(&images[bare])));
+            remarks.push(format!("{} has no number: it counts as the first image", file_name(&images[bare])));
         }
         let belongs = |index: &usize| bare == Some(*index) || within.binary_search(index).is_ok();
         for index in (0..images.len()).filter(|index| !belongs(index)) {
             remarks.push(format!(
                 "left out {}: its name does not belong to the series {}",
-                file(&images[index]),
+                file_name(&images[index]),
                 shown(pattern)
             ));
         }
@@ -129,10 +129,6 @@ pub fn positions_in_names(images: &[PathBuf]) -> Option<Vec<f64>> {
 
 fn first_word(text: &str) -> &str {
     text.split(|c: char| !c.is_alphabetic()).find(|word| !word.is_empty()).unwrap_or_default()
-}
-
-fn file(path: &std::path::Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// The image whose name begins all others, without their numbers: `a.png` of `a (2).png`, `a (3).png`.

@@ -43,7 +43,3 @@ pub struct Fold<'a> {
     /// Number of classes over all rows.
     pub classes: usize,
 }
-
-pub(super) fn largest(values: &[f32]) -> usize {
-    values.iter().enumerate().fold(0, |best, (k, v)| if *v > values[best] { k } else { best })
-}

@@ -1,6 +1,6 @@
 //! k nearest neighbours by Euclidean distance.
 
-use super::method::{Fold, Method, largest};
+use super::method::{Fold, Method};
 use ndarray::{Array2, ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 
@@ -43,7 +43,7 @@ impl Method for Neighbours {
         let distance = |i: usize, j: usize| fold.gram[[j, j]] - 2.0 * fold.gram[[i, j]];
         let answer = |&i: &usize| {
             let distances = fold.kept.iter().map(|&j| (distance(i, j), fold.labels[j])).collect();
-            largest(&vote(distances, fold.classes, k))
+            super::largest(&vote(distances, fold.classes, k)).0
         };
         fold.held.iter().map(answer).collect()
     }

@@ -1,6 +1,6 @@
 //! Multinomial logistic regression by Nesterov's gradient descent on the Gram matrix, with a squared penalty.
 
-use super::method::{Fold, Method, largest};
+use super::method::{Fold, Method};
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 
@@ -75,7 +75,7 @@ impl Method for Softmax {
         let own: Vec<usize> = fold.kept.iter().map(|&row| fold.labels[row]).collect();
         let (signed, offsets) = dual(part(fold.kept).view(), &own, fold.classes, cost);
         let decided = part(fold.held).dot(&signed) + &offsets;
-        decided.rows().into_iter().map(|row| largest(&row.to_vec())).collect()
+        decided.rows().into_iter().map(|row| super::largest(&row.to_vec()).0).collect()
     }
 
     fn fits(&self, width: usize, classes: usize) -> bool {

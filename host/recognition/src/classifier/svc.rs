@@ -1,7 +1,7 @@
 //! Linear support vector classifier, one against the rest, by dual coordinate descent with squared hinge loss
 //! (Hsieh et al., ICML 2008). Runs on the Gram matrix, because clips are few and patterns long.
 
-use super::method::{Fold, Method, largest};
+use super::method::{Fold, Method};
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2};
 use rand::{SeedableRng, seq::SliceRandom};
 use serde::{Deserialize, Serialize};
@@ -83,7 +83,7 @@ impl Method for LinearSvc {
 
     fn answers(fold: &Fold, c: f32) -> Vec<usize> {
         let dual = DualSvc::train(fold.gram, fold.kept, fold.labels, fold.classes, c);
-        fold.held.iter().map(|&i| largest(&dual.decide(fold.gram.row(i)))).collect()
+        fold.held.iter().map(|&i| super::largest(&dual.decide(fold.gram.row(i))).0).collect()
     }
 
     fn fits(&self, width: usize, classes: usize) -> bool {

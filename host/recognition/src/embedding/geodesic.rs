@@ -159,7 +159,6 @@ fn sweep_order(graph: &Graph) -> Vec<u32> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::neighbours::Neighbourhood;
     use super::*;
     use rand::{Rng, SeedableRng};
 
@@ -168,7 +167,7 @@ mod tests {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
         for n in [3_usize, 17, 150] {
             let samples = Array2::from_shape_fn((n, 3), |_| rng.random_range(0.0..1.0_f32));
-            let graph = Graph::new(samples.view(), Neighbourhood::Nearest(2)).expect("enough samples");
+            let graph = Graph::new(samples.view(), 2).expect("enough samples");
             let all = all_pairs(&graph);
             for source in 0..n {
                 let one = dijkstra(&graph, source);

@@ -3,7 +3,7 @@
 //! choice) is exactly PCA. O(N^2 (d + K)) time, 8 N^2 bytes.
 
 use super::geodesic::all_pairs;
-use super::neighbours::{Graph, Neighbourhood};
+use super::neighbours::Graph;
 use super::{EmbeddingError, check, spectral};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
@@ -25,12 +25,12 @@ pub struct Isomap {
 /// disconnected graph, or fewer positive eigenvalues than dimensions.
 pub fn isomap(
     samples: ArrayView2<f32>,
-    neighbourhood: Neighbourhood,
+    neighbours: usize,
     dimensions: usize,
 ) -> Result<Isomap, EmbeddingError> {
     check(samples, dimensions + 2)?;
-    let graph = Graph::new(samples, neighbourhood)?;
-    graph.connected(neighbourhood)?;
+    let graph = Graph::new(samples, neighbours)?;
+    graph.connected(neighbours)?;
     let geodesics = all_pairs(&graph);
     let (coordinates, eigenvalues) = classical_scaling(&geodesics, dimensions)?;
     Ok(Isomap { coordinates, eigenvalues, geodesics })
@@ -133,7 +133,7 @@ mod tests {
     #[test]
     fn a_swiss_roll_is_unrolled() {
         let (rolled, flat) = swiss_roll(700);
-        let found = isomap(rolled.view(), Neighbourhood::Nearest(9), 2).expect("connected");
+        let found = isomap(rolled.view(), 9, 2).expect("connected");
         // Distances of the layout follow the unrolled sheet.
         let (mut a, mut b) = (Array2::<f32>::zeros((700, 700)), Array2::<f32>::zeros((700, 700)));
         for i in 0..700 {
@@ -162,7 +162,7 @@ mod tests {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(8);
         let samples =
             Array2::from_shape_fn((60, 5), |(_, k)| rng.random_range(0.0..1.0_f32) * (5 - k) as f32);
-        let all = isomap(samples.view(), Neighbourhood::Nearest(59), 3).expect("connected");
+        let all = isomap(samples.view(), 59, 3).expect("connected");
         let pca = Pca::fit(samples.view(), 3)
             .expect("enough samples")
             .transform(samples.view())
@@ -178,17 +178,11 @@ mod tests {
     #[test]
     fn bad_input_is_named() {
         let mut samples = Array2::<f32>::zeros((10, 2));
-        assert!(matches!(
-            isomap(samples.view(), Neighbourhood::Nearest(3), 20),
-            Err(EmbeddingError::TooFewSamples { .. })
-        ));
+        assert!(matches!(isomap(samples.view(), 3, 20), Err(EmbeddingError::TooFewSamples { .. })));
         // Ten equal points have no dimensions.
-        let error = isomap(samples.view(), Neighbourhood::Nearest(9), 2).expect_err("no extent");
+        let error = isomap(samples.view(), 9, 2).expect_err("no extent");
         assert_eq!(error, EmbeddingError::TooFewDimensions { found: 0, asked: 2 });
         samples[[4, 1]] = f32::NAN;
-        assert_eq!(
-            isomap(samples.view(), Neighbourhood::Nearest(3), 2).expect_err("NaN"),
-            EmbeddingError::NotFinite { row: 4 }
-        );
+        assert_eq!(isomap(samples.view(), 3, 2).expect_err("NaN"), EmbeddingError::NotFinite { row: 4 });
     }
 }

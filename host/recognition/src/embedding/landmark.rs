@@ -5,7 +5,7 @@
 
 use super::geodesic::{dijkstra, from_sources};
 use super::isomap::classical_scaling;
-use super::neighbours::{Graph, Neighbourhood};
+use super::neighbours::Graph;
 use super::{EmbeddingError, check};
 use ndarray::{Array2, ArrayView2, s};
 use rayon::prelude::*;
@@ -24,7 +24,7 @@ pub struct LandmarkIsomap {
 /// Fails as [`super::isomap::isomap`] does, and for fewer landmarks than dimensions + 2.
 pub fn landmark_isomap(
     samples: ArrayView2<f32>,
-    neighbourhood: Neighbourhood,
+    neighbours: usize,
     landmarks: usize,
     dimensions: usize,
 ) -> Result<LandmarkIsomap, EmbeddingError> {
@@ -37,8 +37,8 @@ pub fn landmark_isomap(
             found: landmarks,
         });
     }
-    let graph = Graph::new(samples, neighbourhood)?;
-    graph.connected(neighbourhood)?;
+    let graph = Graph::new(samples, neighbours)?;
+    graph.connected(neighbours)?;
     let chosen = spread(&graph, count);
     let paths = from_sources(&graph, &chosen);
     let between = Array2::from_shape_fn((count, count), |(i, j)| paths[[i, chosen[j]]]);
@@ -104,8 +104,8 @@ mod tests {
             let (a, b) = ((i % 20) as f32 * 0.1, (i / 20) as f32 * 0.1);
             [(1.3 * b).cos(), a, (1.3 * b).sin()][k]
         });
-        let whole = isomap(sheet.view(), Neighbourhood::Nearest(8), 2).expect("connected");
-        let part = landmark_isomap(sheet.view(), Neighbourhood::Nearest(8), 80, 2).expect("connected");
+        let whole = isomap(sheet.view(), 8, 2).expect("connected");
+        let part = landmark_isomap(sheet.view(), 8, 80, 2).expect("connected");
         for k in 0..2 {
             let (a, b) = (whole.coordinates.column(k), part.coordinates.column(k));
             let (ma, mb) = (a.mean().expect("samples"), b.mean().expect("samples"));
@@ -113,6 +113,6 @@ mod tests {
             let correlation = a.dot(&b) / (a.dot(&a) * b.dot(&b)).sqrt();
             assert!(correlation.abs() > 0.99, "dimension {k}: {correlation}");
         }
-        assert!(landmark_isomap(sheet.view(), Neighbourhood::Nearest(8), 3, 2).is_err());
+        assert!(landmark_isomap(sheet.view(), 8, 3, 2).is_err());
     }
 }

@@ -1,29 +1,9 @@
-//! Neighbour graph: K nearest or within a radius, symmetric, in compressed sparse rows. O(N^2 d) flops, O(N K) memory.
+//! Neighbour graph: K nearest, symmetric, in compressed sparse rows. O(N^2 d) flops, O(N K) memory.
 //! Edges are recomputed from the samples to avoid the cancellation of the blockwise matrix product.
 
 use super::{EmbeddingError, squared_distance, squared_norms, times_transposed};
 use ndarray::{ArrayView2, s};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
-
-/// Selection of neighbours.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Neighbourhood {
-    /// The K nearest others. K = N - 1 makes Isomap equal to PCA (the thesis' choice).
-    Nearest(usize),
-    /// All others within this distance, in the samples' units.
-    Radius(f32),
-}
-
-impl std::fmt::Display for Neighbourhood {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Nearest(k) => write!(f, "the {k} nearest"),
-            Self::Radius(radius) => write!(f, "all within {radius}"),
-        }
-    }
-}
 
 /// Undirected weighted graph in compressed sparse rows; each edge is in both rows.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,16 +19,14 @@ pub struct Graph {
 const BLOCK: usize = 256;
 
 impl Graph {
-    /// The graph of a sample matrix (N x d); fails if no neighbours are requested.
-    pub fn new(samples: ArrayView2<f32>, neighbourhood: Neighbourhood) -> Result<Self, EmbeddingError> {
+    /// The graph of a sample matrix (N x d) with the `neighbours` nearest of each, at least 1 and below N.
+    pub fn new(samples: ArrayView2<f32>, neighbours: usize) -> Result<Self, EmbeddingError> {
         let n = samples.nrows();
-        if let Neighbourhood::Nearest(k) = neighbourhood
-            && (k == 0 || k >= n)
-        {
+        if neighbours == 0 || neighbours >= n {
             return Err(EmbeddingError::Shape {
                 what: "number of neighbours (at least 1, below the number of samples)",
                 expected: n.saturating_sub(1).min(10),
-                found: k,
+                found: neighbours,
             });
         }
         let samples = samples.as_standard_layout();
@@ -68,7 +46,7 @@ impl Graph {
                     let squared: Vec<f32> =
                         product.iter().zip(&norms).map(|(p, norm)| norm - 2.0 * p).collect();
                     let own = row(i);
-                    pick(&squared, norms[i], i, neighbourhood)
+                    pick(&squared, i, neighbours)
                         .into_iter()
                         .map(|j| {
                             let squared = arch.dispatch(|| squared_distance(own, row(j as usize)));
@@ -139,32 +117,24 @@ impl Graph {
     }
 
     /// Returns [`EmbeddingError::Disconnected`] with the parts unless the graph is connected.
-    pub fn connected(&self, neighbourhood: Neighbourhood) -> Result<(), EmbeddingError> {
+    pub fn connected(&self, neighbours: usize) -> Result<(), EmbeddingError> {
         let components = self.components();
         if components.len() <= 1 {
             return Ok(());
         }
-        Err(EmbeddingError::Disconnected { components, neighbours: neighbourhood.to_string() })
+        Err(EmbeddingError::Disconnected { components, neighbours })
     }
 }
 
-/// Neighbours of sample `i` from `|b|^2 - 2 a.b` for all b.
-fn pick(squared: &[f32], norm: f32, i: usize, neighbourhood: Neighbourhood) -> Vec<u32> {
-    match neighbourhood {
-        Neighbourhood::Radius(radius) => {
-            let limit = radius * radius - norm;
-            (0..squared.len() as u32).filter(|&j| j as usize != i && squared[j as usize] <= limit).collect()
-        }
-        Neighbourhood::Nearest(k) => {
-            let mut order: Vec<u32> = (0..squared.len() as u32).filter(|&j| j as usize != i).collect();
-            let by = |a: &u32, b: &u32| squared[*a as usize].total_cmp(&squared[*b as usize]).then(a.cmp(b));
-            if k < order.len() {
-                order.select_nth_unstable_by(k - 1, by);
-                order.truncate(k);
-            }
-            order
-        }
+/// The `k` nearest of sample `i` from `|b|^2 - 2 a.b` for all b.
+fn pick(squared: &[f32], i: usize, k: usize) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..squared.len() as u32).filter(|&j| j as usize != i).collect();
+    let by = |a: &u32, b: &u32| squared[*a as usize].total_cmp(&squared[*b as usize]).then(a.cmp(b));
+    if k < order.len() {
+        order.select_nth_unstable_by(k - 1, by);
+        order.truncate(k);
     }
+    order
 }
 
 #[cfg(test)]
@@ -175,14 +145,14 @@ mod tests {
     #[test]
     fn a_line_of_points_has_its_neighbours_and_two_lines_are_two_parts() {
         let line = Array2::from_shape_fn((10, 2), |(i, j)| if j == 0 { i as f32 } else { 0.5 });
-        let graph = Graph::new(line.view(), Neighbourhood::Nearest(1)).expect("enough samples");
+        let graph = Graph::new(line.view(), 1).expect("enough samples");
         assert_eq!(graph.edges(5).filter(|(_, d)| (*d - 1.0).abs() < 1e-6).count(), graph.edges(5).count());
-        let ring = Graph::new(line.view(), Neighbourhood::Radius(2.1)).expect("radius");
-        assert_eq!(ring.edges(5).map(|(j, _)| j).collect::<Vec<_>>(), vec![3, 4, 6, 7]);
+        let both = Graph::new(line.view(), 2).expect("enough samples");
+        assert_eq!(both.edges(5).map(|(j, _)| j).collect::<Vec<_>>(), vec![4, 6]);
         let two = Array2::from_shape_fn((10, 1), |(i, _)| if i < 6 { i as f32 } else { 100.0 + i as f32 });
-        let graph = Graph::new(two.view(), Neighbourhood::Nearest(2)).expect("enough samples");
-        let error = graph.connected(Neighbourhood::Nearest(2)).expect_err("two parts");
+        let graph = Graph::new(two.view(), 2).expect("enough samples");
+        let error = graph.connected(2).expect_err("two parts");
         assert!(error.to_string().contains("6 samples from 0, 1 on; 4 samples from 6, 7 on"), "{error}");
-        assert!(Graph::new(two.view(), Neighbourhood::Nearest(10)).is_err());
+        assert!(Graph::new(two.view(), 10).is_err());
     }
 }

@@ -2,9 +2,10 @@
 
 use super::{EmbeddingError, check, spectral};
 use ndarray::{Array1, Array2, ArrayView2, Axis};
+use serde::{Deserialize, Serialize};
 
 /// Mean and leading principal directions.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pca {
     /// Mean of the training samples.
     pub mean: Array1<f32>,

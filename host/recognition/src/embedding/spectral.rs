@@ -19,11 +19,7 @@ pub(crate) type Pairs = (Vec<f64>, Vec<Vec<f64>>);
 /// eigenvectors as rows, largest entry positive for repeatability.
 pub(crate) fn leading(matrix: &[f64], n: usize, wanted: usize) -> Pairs {
     let view = MatRef::from_row_major_slice(matrix, n, n);
-    let apply = |block: &Mat<f64>| {
-        let mut product = Mat::<f64>::zeros(n, block.ncols());
-        matmul(product.as_mut(), Accum::Replace, view, block, 1.0, Par::rayon(0));
-        product
-    };
+    let apply = |block: &Mat<f64>| product_of(view, block.as_ref());
     leading_of(n, wanted, 1e-8, apply).unwrap_or_else(|| positive(whole(view), wanted))
 }
 

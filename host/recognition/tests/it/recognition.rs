@@ -44,8 +44,7 @@ fn right(people: &[Clip], mode: Mode, changes: &[fn(&Clip) -> Clip]) -> Vec<f64>
         for clip in &held {
             for (right, change) in right.iter_mut().zip(changes) {
                 let answer = recogniser.recognise(&change(clip).views).expect("fits");
-                let best = answer.probabilities.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-                *right += u32::from(best.is_some_and(|(activity, _)| *activity == clip.activity));
+                *right += u32::from(answer.best() == Some(&clip.activity));
             }
         }
     }
@@ -68,9 +67,8 @@ fn unseen_people_are_recognised_and_neither_order_nor_speed_matters_much() {
     assert_eq!(plain, reversed, "reversing changes nothing");
     assert!((plain - slow).abs() <= 0.05, "{plain} {slow}");
     assert!((shuffled - plain).abs() < 0.2);
-    let evaluated = |mode: Mode| {
-        leave_one_subject_out(&people, &experiment(mode), Clone::clone).expect("an outcome").each.accuracy()
-    };
+    let evaluated =
+        |mode: Mode| leave_one_subject_out(&people, &experiment(mode)).expect("an outcome").each.accuracy();
     // Equal trainings and clips: only probabilities that round to a tie may differ, one clip of sixty.
     let free = evaluated(Mode::OrderFree);
     assert!((free - plain).abs() < 0.02, "{free} {plain}");
@@ -196,7 +194,7 @@ fn crafted_models_with_good_checksums_are_refused_or_answer_but_never_panic() {
     assert!(files.iter().all(|bytes| Recogniser::from_bytes(bytes).is_ok()));
     let mut runner = TestRunner::new(ProptestConfig {
         failure_persistence: None,
-        ..ProptestConfig::with_cases(crate::cases(150))
+        ..ProptestConfig::with_cases(farnear_test_data::cases(150))
     });
     // Settings, names and lengths are at the front, where most damage is placed.
     let place = prop_oneof![3 => 0..200_usize, 1 => 0..files[1].len()];

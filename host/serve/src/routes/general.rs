@@ -61,7 +61,7 @@ pub fn routes(api: Api) -> Api {
             "/api/socket",
             "A WebSocket: first a Hello with the client's secret, then the State at every change, and live pictures (u32 length of a JSON \
              header, header, pixels), among them the depth of a pair that was just taken (type fresh). {\"type\":\"stop\"} stops the rig; {\"type\":\"seen\"} after each picture lets the next one come at once, \
-             without it they come once a second.",
+             without it they come once a second. {\"type\":\"here\"} comes every two seconds.",
             "application/json",
             socket::open,
         )

@@ -34,6 +34,16 @@ fn one_browser_has_control_and_hands_it_over_on_request() {
 }
 
 #[test]
+fn a_browser_hears_from_the_server_while_nothing_happens() {
+    let served = Served::captures_only();
+    let mut watching = Socket::open(&served);
+    // The server closes a connection that is silent for five seconds: the second message comes before that.
+    for _ in 0..2 {
+        watching.receive("here");
+    }
+}
+
+#[test]
 fn a_browser_that_disconnects_leaves_nothing_moving() {
     let served = Served::with_board(Faults { never_ends: true, ..Faults::default() });
     served.ready();

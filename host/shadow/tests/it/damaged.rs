@@ -1,11 +1,10 @@
 //! Damaged camera files and random silhouettes.
 
-use crate::cases;
 use farnear_shadow::sun::SunPosition;
 use farnear_shadow::{CameraFile, Lamp, Light, Method, remove};
 use farnear_silhouettes::mask::Mask;
 use farnear_silhouettes::silhouette::raster::fill_convex;
-use farnear_test_data::damaged;
+use farnear_test_data::{cases, damaged};
 use proptest::prelude::*;
 
 const CAMERA: &str = "[camera]\nheight_m = 0.8\nazimuth_deg = 140.0\npitch_deg = 5.0\nfocal_length_mm = 4.0\npixel_um = 60.0\nwidth_px = 64\nheight_px = 48\n\n[subject]\nheight_m = 1.75\nhead_width_m = 0.17\n\n[standard_deviations]\nday = 0.3\nazimuth_deg = 2.0\n";

@@ -146,7 +146,7 @@ fn detectors_keep_most_of_what_moves() {
     for (method, _, score) in &detectors {
         let detection =
             score.removed_percent().map_or("no labelled shadow".into(), |rate| format!("{rate:.1} %"));
-        let discrimination = score.discrimination_percent().unwrap();
+        let discrimination = 100.0 - score.wrongly_removed_percent().unwrap();
         println!(
             "{}: detection {detection}, discrimination {discrimination:.1} % of {} pixels",
             method.name(),

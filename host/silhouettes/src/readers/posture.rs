@@ -106,10 +106,7 @@ pub fn lying(up: Up, frames: &Frames, anatomy: &Anatomy, planar: bool) -> Option
     let extents = frames.iter().filter(|_| planar || ways.is_empty()).filter_map(|frame| {
         let points: Vec<Point3> =
             body_points(frame, &anatomy.body).iter().map(|point| up.to_z(*point)).collect();
-        let side = |k: usize| {
-            let values = || points.iter().map(|point| point[k]);
-            values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
-        };
+        let side = |k: usize| extent(&points, k);
         (points.len() > 3).then(|| (side(0).max(side(1)), side(2)))
     });
     let (mut all, mut longer) = (0_usize, 0);
@@ -138,6 +135,12 @@ pub fn body_points(frame: &[Option<Point3>], body: &[usize]) -> Vec<Point3> {
         return frame.iter().filter_map(visible).collect();
     }
     body.iter().filter_map(|place| visible(frame.get(*place)?)).collect()
+}
+
+/// Distance between the outermost points along an axis.
+pub fn extent(points: &[Point3], axis: usize) -> f64 {
+    let values = || points.iter().map(|point| point[axis]);
+    values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ mod namings;
 
 use std::collections::BTreeMap;
 
-use super::template::Template;
+use super::{anatomy::without_prefix, template::Template};
 use namings::{NAMINGS, Naming};
 
 /// Text before the names of one body's points: of Mixamo, 3ds Max, Motive, VRoid and Character Creator.
@@ -182,7 +182,7 @@ fn spellings(names: &[String]) -> Vec<Vec<String>> {
     /// Texts of a name that are counted.
     const MOST: usize = 4;
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
-    for own in names.iter().map(|name| without_subject(name)) {
+    for own in names.iter().map(|name| without_prefix(name)) {
         for (at, _) in own.match_indices('_').take(MOST) {
             *counts.entry(&own[..=at]).or_default() += 1;
         }
@@ -193,20 +193,16 @@ fn spellings(names: &[String]) -> Vec<Vec<String>> {
     let simple: Vec<String> = names.iter().map(|name| simplified(name)).collect();
     let without: Option<Vec<String>> = shared.map(|(text, _)| {
         let own = |(name, simple): (&String, &String)| {
-            without_subject(name).strip_prefix(text).map_or_else(|| simple.clone(), simplified)
+            without_prefix(name).strip_prefix(text).map_or_else(|| simple.clone(), simplified)
         };
         names.iter().zip(&simple).map(own).collect()
     });
     std::iter::once(simple).chain(without).collect()
 }
 
-fn without_subject(name: &str) -> &str {
-    name.rsplit_once(':').map_or(name, |(_, own)| own)
-}
-
 /// Lower-case letters and digits, without a subject's name.
 fn simplified(name: &str) -> String {
-    let mut simple: String = without_subject(name)
+    let mut simple: String = without_prefix(name)
         .chars()
         .filter(char::is_ascii_alphanumeric)
         .map(|c| c.to_ascii_lowercase())

@@ -8,6 +8,7 @@
 //! ```
 //! Left and right limbs are separate parts. Markers may belong to several parts, which closes joints.
 
+use super::anatomy::without_prefix;
 use serde::{Deserialize, Serialize};
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -103,11 +104,7 @@ impl Template {
     }
 
     fn missing(&self, names: &[String]) -> (Vec<String>, usize) {
-        let has = |marker: &str| {
-            names
-                .iter()
-                .any(|name| name == marker || name.rsplit_once(':').is_some_and(|(_, short)| short == marker))
-        };
+        let has = |marker: &str| names.iter().any(|name| name == marker || without_prefix(name) == marker);
         let mut all: Vec<&String> = self.parts.iter().flat_map(|part| &part.markers).collect();
         all.sort();
         all.dedup();

@@ -1,6 +1,5 @@
 //! A synthetic walker, and damaged files that name the line.
 
-use crate::cases;
 use farnear_silhouettes::mask::{BoundingBox, area};
 use farnear_silhouettes::readers::{
     self, bvh,
@@ -11,6 +10,7 @@ use farnear_silhouettes::silhouette::{
     template::Template,
     view::{Canvas, views_round},
 };
+use farnear_test_data::cases;
 use proptest::prelude::*;
 use std::fmt::Write;
 
@@ -92,9 +92,6 @@ fn walk(frames: usize) -> String {
 #[test]
 fn a_walk_of_the_cmu_kind_makes_silhouettes_from_eight_views() {
     let text = walk(30);
-    if let Ok(path) = std::env::var("FARNEAR_WRITE_BVH") {
-        std::fs::write(path, &text).expect("written"); // for the command line
-    }
     let recording = readers::read(text.as_bytes(), "bvh", Choices::default()).expect("a BVH file");
     assert_eq!((recording.names.len(), recording.frames.len()), (28, 30));
     assert!((recording.rate_hz - 30.0).abs() < 0.01);

@@ -1,13 +1,12 @@
 //! Files of every kind with damaged words, to reach beyond the first line.
 
-use crate::cases;
 use farnear_silhouettes::readers::{self, c3d, csv, kinect, matlab, ntu, recording::Choices, trc};
 use farnear_silhouettes::silhouette::template::Template;
-use farnear_test_data::damaged;
+use farnear_test_data::{cases, damaged};
 use proptest::prelude::*;
 use std::fmt::Write;
 
-fn ntu_file() -> String {
+pub fn ntu_file() -> String {
     let mut text = String::from("3\n");
     for frame in 0..3 {
         text += "1\n72057594037944738 0 0 1 1 0 1 0.1 0.2 2\n25\n";
@@ -25,7 +24,8 @@ fn kinect_file() -> String {
 }
 
 const TRC: &str = "PathFileType\t4\t(X/Y/Z)\twalk.trc\nDataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames\n100\t100\t2\t2\tmm\t100\t1\t2\nFrame#\tTime\tA\t\t\tB\t\t\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n\n1\t0.0\t1\t2\t3\t4\t5\t6\n2\t0.01\t1\t2\t3\t4\t5\t6\n";
-const CSV: &str = "frame,HEAD_x,HEAD_y,HEAD_z,HIP_x,HIP_y,HIP_z\n0,0,0,1700,0,0,900\n1,0,0,1690,0,0,890\n";
+pub const CSV: &str =
+    "frame,HEAD_x,HEAD_y,HEAD_z,HIP_x,HIP_y,HIP_z\n0,0,0,1700,0,0,900\n1,0,0,1690,0,0,890\n";
 /// A row for each point.
 const LONG: &str = "frame,person_id,keypoint,x,y,score\n0,1,nose,10,20,0.9\n0,1,left_knee,10,80,0.9\n0,2,nose,50,20,0.9\n1,1,nose,11,20,0.9\n";
 

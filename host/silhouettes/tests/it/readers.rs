@@ -1,6 +1,6 @@
 //! Readers on real recordings, and on damaged copies.
 
-use crate::cases;
+use crate::damaged::{CSV, ntu_file};
 use farnear_silhouettes::mask::area;
 use farnear_silhouettes::readers::{
     self, c3d, csv, kinect, matlab, ntu,
@@ -12,6 +12,7 @@ use farnear_silhouettes::silhouette::{
     template::Template,
     view::{Canvas, views_round},
 };
+use farnear_test_data::cases;
 use proptest::prelude::*;
 
 fn shared(name: &str) -> Vec<u8> {
@@ -314,14 +315,6 @@ fn names_of_a_trc_file_without_columns_are_reported_and_not_read() {
     assert!(error.contains("4 marker names, NumMarkers says 2"), "{error}");
 }
 
-fn ntu_skeleton() -> String {
-    let joints = "0.1 0.9 3.2 1 2 3 4 0 0 0 1 2\n".repeat(25);
-    let person = |id: u32| format!("{id} 0 1 1 0 0 0 0.1 0.2 2\n25\n{joints}");
-    format!("2\n2\n{}{}1\n{}", person(71), person(72), person(72))
-}
-
-const CSV: &str = "frame,A_x,A_y,A_z,B_x,B_y,B_z\n1,1,2,3,,,\n2,4,5,6,7,8,9\n";
-
 proptest! {
     #![proptest_config(ProptestConfig { cases: cases(256), failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
@@ -342,7 +335,7 @@ proptest! {
         let _ = c3d::read(&bytes[..cut.index(bytes.len())]);
         let _ = trc::read(&damaged(TRC.as_bytes()));
         let _ = csv::read(&damaged(CSV.as_bytes()), Choices::default());
-        let skeleton = ntu_skeleton();
+        let skeleton = ntu_file();
         assert!(ntu::read(skeleton.as_bytes()).is_ok());
         let _ = ntu::read(&damaged(skeleton.as_bytes()));
         let _ = ntu::read(&skeleton.as_bytes()[..cut.index(skeleton.len())]);

@@ -68,6 +68,11 @@ struct Seen {
     changes_of_light: usize,
 }
 
+fn extractor(first: &Array3<u8>) -> Extractor {
+    let first = Frame::Rgb(first.view());
+    Extractor::like(first, ExtractorSettings::for_frame(first)).expect("settings hold")
+}
+
 fn seen(learning: Learning) -> Seen {
     let first = picture(0);
     let first = Frame::Rgb(first.view());
@@ -117,9 +122,7 @@ fn learning_can_be_limited_or_stopped() {
 
 #[test]
 fn pixels_are_removed_in_the_light_of_the_background_and_an_emptied_mask_is_flagged() {
-    let first = picture(0);
-    let first = Frame::Rgb(first.view());
-    let mut extractor = Extractor::like(first, ExtractorSettings::for_frame(first)).expect("settings hold");
+    let mut extractor = extractor(&picture(0));
     for frame in 0..310 {
         let dimmed = frame >= 300;
         let found = extractor.extract_without(Frame::Rgb(picture(frame).view()), |seen, model, mask| {
@@ -139,9 +142,7 @@ fn pixels_are_removed_in_the_light_of_the_background_and_an_emptied_mask_is_flag
 
 #[test]
 fn learns_an_object_that_appears_without_walking() {
-    let first = picture(0);
-    let first = Frame::Rgb(first.view());
-    let mut extractor = Extractor::like(first, ExtractorSettings::for_frame(first)).expect("settings hold");
+    let mut extractor = extractor(&picture(0));
     let mut areas = Vec::new();
     for frame in 0..250 {
         let mut picture = picture(frame % 100);
@@ -166,9 +167,7 @@ fn a_shaking_camera_is_registered() {
         let truth = mask.slice(ndarray::s![down..SIZE.0 - 6 + down, right..SIZE.1 - 6 + right]).to_owned();
         (picture(frame + 100).slice(cut).to_owned(), truth)
     };
-    let first = shaken(0).0;
-    let first = Frame::Rgb(first.view());
-    let mut extractor = Extractor::like(first, ExtractorSettings::for_frame(first)).expect("settings hold");
+    let mut extractor = extractor(&shaken(0).0);
     let (mut person, mut masked) = (0, 0);
     for frame in 0..180 {
         let (picture, truth) = shaken(frame);
@@ -185,12 +184,11 @@ fn a_shaking_camera_is_registered() {
 /// Overlaps of masks and people in these frames, which are learned first, and the changes of light.
 fn learned_first(frames: std::ops::Range<usize>) -> (Vec<f64>, usize) {
     let first = picture(frames.start);
-    let first = Frame::Rgb(first.view());
-    let mut extractor = Extractor::like(first, ExtractorSettings::for_frame(first)).expect("settings hold");
+    let mut extractor = extractor(&first);
     for frame in frames.clone() {
         extractor.learn(Frame::Rgb(picture(frame).view())).expect("a frame");
     }
-    extractor.rewind(first);
+    extractor.rewind(Frame::Rgb(first.view()));
     let mut overlap = |frame| {
         let subject = extractor.extract(Frame::Rgb(picture(frame).view())).expect("a frame").subject;
         assert!(!subject.flags.contains(&Flag::Learning));

@@ -30,7 +30,7 @@ pub enum BatchError {
     InUse { path: PathBuf },
     #[error("the input {} is the result of the job on line {line}: move this job behind that one", path.display())]
     Order { path: PathBuf, line: usize },
-    #[error("cannot write the {what} to {}: {reason}; name another file", path.display())]
+    #[error("cannot write the {what} to {}: {reason}; name another file with --{what}", path.display())]
     Report { what: &'static str, path: PathBuf, reason: String },
     #[error("{failed} of {jobs} jobs failed; {} says why; run the batch again to do them again", failures.display())]
     Failed { failed: usize, jobs: usize, failures: PathBuf },

@@ -8,7 +8,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use farnear_files::staging::PARTIAL;
+use farnear_files::staging::{PARTIAL, Unfinished, uninterrupted};
 use serde_json::Value;
 
 use super::{BatchError, provenance::Provenance};
@@ -43,8 +43,8 @@ pub(super) struct Place {
 }
 
 pub(super) enum Found {
-    /// Up to date, with its figures.
-    Done(Option<Value>),
+    /// Up to date, with its figures and warnings.
+    Done(Option<Value>, Vec<String>),
     /// Missing, incomplete, or made from something else.
     ToDo,
 }
@@ -60,18 +60,25 @@ impl Place {
         let (record, root) = (self.record(), self.root());
         if let Some(found) = Provenance::read(&record) {
             let done = found.fulfils(wanted, root, verify);
-            return Ok(if done { Found::Done(found.figures()) } else { Found::ToDo });
+            return Ok(if done { Found::Done(found.figures(), found.warnings) } else { Found::ToDo });
         }
         let empty = fs::read_dir(&self.target).is_ok_and(|mut entries| entries.next().is_none());
+        let is_free = fs::symlink_metadata(&self.target).is_err();
         // An unreadable record still marks a batch's file.
-        if !self.target.exists() || empty || record.exists() {
+        if is_free || empty || record.exists() {
             return Ok(Found::ToDo);
         }
         Err(BatchError::Foreign { path: self.target.clone() }.into())
     }
 
-    /// Runs `make` with a temporary place and moves its result. First removes remains of an interrupted run.
-    pub fn fill(&self, wanted: Provenance, make: impl FnOnce(&Path) -> Result<Value>) -> Result<Value> {
+    /// Runs `make` with a temporary place and moves its result. First removes remains of an interrupted run. `warnings`
+    /// are those of `make`.
+    pub fn fill(
+        &self,
+        mut wanted: Provenance,
+        make: impl FnOnce(&Path) -> Result<Value>,
+        warnings: impl FnOnce() -> Vec<String>,
+    ) -> Result<Value> {
         let name = self.target.file_name().unwrap_or_default();
         let aside = self.beside(".", ASIDE);
         let unwritable = |source| BatchError::Write { path: self.target.clone(), source };
@@ -79,7 +86,7 @@ impl Place {
             fs::create_dir_all(parent).map_err(unwritable)?;
         }
         let _lock = self.lock(&aside)?;
-        let clearing = Clearing(&aside);
+        let clearing = Unfinished::new(aside.clone());
         clear(&aside).map_err(unwritable)?;
         let made = aside.join(name);
         let found = make(&made)?;
@@ -91,9 +98,10 @@ impl Place {
         if let Some(name) = strangers.iter().find(is_in_the_way) {
             return Err(BatchError::Foreign { path: self.target.join(name) }.into());
         }
+        wanted.warnings = warnings();
         let new = wanted.with_figures(&found).with_output(&made)?;
         let records = [toml::to_string(&new.unfinished(earlier.as_ref()))?, toml::to_string(&new)?];
-        self.put(&made, earlier.as_ref(), records).map_err(unwritable)?;
+        uninterrupted(|| self.put(&made, earlier.as_ref(), records)).map_err(unwritable)?;
         drop(clearing);
         Ok(found)
     }
@@ -102,8 +110,9 @@ impl Place {
     pub fn discard(&self) -> io::Result<()> {
         let record = self.record();
         let Some(found) = Provenance::read(&record) else { return Ok(()) };
-        fs::remove_file(record)?;
-        found.outputs().try_for_each(|name| self.remove(name))
+        // The record goes last: without it, the files of an interrupted removal would be strangers.
+        let record = Path::new(record.file_name().unwrap_or_default());
+        uninterrupted(|| found.outputs().chain([record]).try_for_each(|name| self.remove(name)))
     }
 
     /// Removes a file of the result and the folders that it leaves empty.
@@ -195,15 +204,6 @@ impl Place {
     }
 }
 
-/// Removes the temporary folder when dropped.
-struct Clearing<'a>(&'a Path);
-
-impl Drop for Clearing<'_> {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(self.0); // else the next run does
-    }
-}
-
 fn clear(folder: &Path) -> io::Result<()> {
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();
@@ -220,14 +220,16 @@ mod tests {
     use crate::batch::fields::Fields;
 
     fn fill(place: &Place, names: &[&str]) -> Result<Value> {
-        place.fill(Provenance::new("depth", &Fields::default(), Vec::new()), |made| {
+        let make = |made: &Path| {
             for name in names {
                 let file = if place.is_file { made.to_path_buf() } else { made.join(name) };
                 fs::create_dir_all(file.parent().expect("a parent")).expect("a folder");
                 fs::write(file, name).expect("a writable folder");
             }
             Ok(Value::Null)
-        })
+        };
+        let warnings = || vec!["too dark".into()];
+        place.fill(Provenance::new("depth", &Fields::default(), Vec::new()), make, warnings)
     }
 
     fn listing(folder: &Path) -> Vec<String> {
@@ -281,7 +283,34 @@ mod tests {
         fs::remove_dir(target.join("d")).expect("an empty folder");
         fill(&place, &["d"]).expect("a result");
         assert_eq!(listing(&target), ["batch.toml", "d", "notes.txt"]);
-        assert!(matches!(place.look(&wanted, false), Ok(Found::Done(_))));
+        let Ok(Found::Done(_, warnings)) = place.look(&wanted, false) else { panic!("it is done") };
+        assert_eq!(warnings, ["too dark"], "those of the run that made it");
+    }
+
+    #[test]
+    fn an_interrupted_removal_leaves_the_record() {
+        let root = tempfile::tempdir().expect("a folder");
+        let target = root.path().join("result");
+        let place = Place::new(target.clone(), false);
+        fill(&place, &["a", "b"]).expect("a result");
+        fs::remove_file(target.join("b")).expect("a file");
+        fs::create_dir(target.join("b")).expect("a folder");
+        place.discard().expect_err("a folder in the place of a file");
+        assert_eq!(listing(&target), ["b", "batch.toml"]);
+        let wanted = Provenance::new("depth", &Fields::default(), Vec::new());
+        assert!(matches!(place.look(&wanted, false), Ok(Found::ToDo)));
+        fs::remove_dir(target.join("b")).expect("an empty folder");
+        place.discard().expect("the rest is removed");
+        assert_eq!(listing(root.path()), Vec::<String>::new());
+    }
+
+    #[test]
+    fn a_link_without_a_target_is_not_replaced() {
+        let root = tempfile::tempdir().expect("a folder");
+        symlink("nowhere", root.path().join("link")).expect("a link");
+        let place = Place::new(root.path().join("link"), true);
+        let wanted = Provenance::new("depth", &Fields::default(), Vec::new());
+        assert!(place.look(&wanted, false).is_err());
     }
 
     #[test]

@@ -32,6 +32,9 @@ pub(super) struct Provenance {
     /// The job's output as JSON, for later runs.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     figures: String,
+    /// The job's warnings, for later runs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
     #[serde(default)]
     input: Vec<HashedFile>,
     #[serde(default)]
@@ -74,6 +77,7 @@ impl Provenance {
             kind: kind.into(),
             settings: fields.without("out"),
             figures: String::new(),
+            warnings: Vec::new(),
             input,
             output: Vec::new(),
         }

@@ -44,7 +44,7 @@ impl<'a> Tally<'a> {
         if let Some(path) = failures {
             match fs::remove_file(path) {
                 Err(source) if source.kind() != io::ErrorKind::NotFound => {
-                    return Err(BatchError::Write { path: path.into(), source });
+                    return Err(unwritable(path)(source));
                 }
                 _ => {}
             }
@@ -88,21 +88,27 @@ impl<'a> Tally<'a> {
 
     fn keep(&self, file: &mut Option<File>, report: &JobReport) -> Result<()> {
         let Some(path) = &self.failures else { return Ok(()) };
-        let unwritable = |source| BatchError::Write { path: path.clone(), source };
         let file = match file {
             Some(file) => file,
-            // Another run at the same time may write there, too.
-            None => file.insert(OpenOptions::new().create(true).append(true).open(path).map_err(unwritable)?),
+            None => {
+                // Another run at the same time may write there, too.
+                let opened = OpenOptions::new().create(true).append(true).open(path);
+                file.insert(opened.map_err(unwritable(path))?)
+            }
         };
-        let line = serde_json::to_string(report).map_err(|error| unwritable(error.into()))?;
+        let line = serde_json::to_string(report).map_err(|error| unwritable(path)(error.into()))?;
         // One write, which the system does not split.
-        file.write_all(format!("{line}\n").as_bytes()).map_err(unwritable)?;
+        file.write_all(format!("{line}\n").as_bytes()).map_err(unwritable(path))?;
         Ok(())
     }
 
     pub fn end(&self) -> BatchFigures {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner).figures.clone()
     }
+}
+
+fn unwritable(path: &Path) -> impl FnOnce(io::Error) -> BatchError + '_ {
+    move |source| BatchError::Report { what: "failures", path: path.into(), reason: source.to_string() }
 }
 
 #[cfg(test)]

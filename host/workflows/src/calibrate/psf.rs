@@ -217,7 +217,8 @@ fn doubt(found: &PsfFit, model: Model) -> Option<String> {
         }
         Verdict::Unexplained => Some(format!(
             "the {model} point spread function leaves {:.2} % of the images' energy, noise {:.2} %: {}do both images show the same, \
-             does the target stand where it is said to, are far_mm and max_blur_px right? Depth measured with it is biased",
+             are they linear in light (no tone curve), does the target stand where it is said to, are far_mm and max_blur_px right? \
+             Depth measured with it is biased",
             100.0 * found.residual,
             100.0 * found.noise,
             if model == Model::Free { "" } else { "try --model free; else: " }

@@ -25,6 +25,7 @@ use serde_with::{DisplayFromStr, serde_as};
 
 use crate::{
     context::Context,
+    depth::tone,
     error::{Result, WorkflowError},
     figures::{rounded, rounded_for},
     focus_stack::fill_specks,
@@ -224,6 +225,10 @@ pub fn calibrate(request: &CalibrateStackRequest, context: &Context<'_>) -> Resu
         error => WorkflowError::parameter("stack", request.stack.display(), error.to_string()),
     })?;
     let figures = figures(&found, &listed, slices[0].dim(), request);
+    let [far, near] = pair_to_try(&found, slices[0].dim(), slices.len());
+    if let Some(doubt) = tone::doubt_of_slices(&slices[far], &slices[near], &found.optics) {
+        context.progress.warn(&doubt);
+    }
     let drawn = match plot {
         Some((file, format)) => Some((file, plot::plot(&figures, format)?)),
         None => None,
@@ -412,6 +417,13 @@ fn telling_pair(focus: f64, pair_step: usize, slices: usize) -> usize {
     (0..slices.saturating_sub(pair_step)).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0)
 }
 
+/// The far and the near slice of the pair to try first.
+fn pair_to_try(found: &StackLens, (height, width): (usize, usize), slices: usize) -> [usize; 2] {
+    let pair_step = found.optics.stage().map_or(1, |stage| stage.pair_step);
+    let far = telling_pair(found.plane.at(0.5 * height as f64, 0.5 * width as f64), pair_step, slices);
+    [far, far + pair_step]
+}
+
 /// A path as a word of a shell's command.
 fn shell_word(path: &Path) -> String {
     let text = path.display().to_string();
@@ -425,13 +437,13 @@ fn figures(
     size: (usize, usize),
     request: &CalibrateStackRequest,
 ) -> StackFigures {
-    let StackLens { optics, blur, held_out, plane, .. } = found;
+    let StackLens { optics, blur, held_out, .. } = found;
     let files = &listed.images;
     let stage = optics.stage().copied().unwrap_or_else(|| Stage::identity(1, 1));
     let Stage { bin, pair_step, residual, .. } = stage;
     let range = optics.working_range();
     let range_mm = range.far_mm - range.near_mm;
-    let far = telling_pair(plane.at(0.5 * size.0 as f64, 0.5 * size.1 as f64), pair_step, files.len());
+    let [far, near] = pair_to_try(found, size, files.len());
     let out = shell_word(&request.out);
     let of_range = |mm: f64| rounded_for(range_mm, mm, 4);
     let of_error = |mm: f64| rounded_for(held_out.rms_mm, mm, 3);
@@ -442,7 +454,7 @@ fn figures(
              without a warning): farnear depth {} {} --optics {out}",
             of_range(range_mm),
             shell_word(&files[far]),
-            shell_word(&files[far + pair_step])
+            shell_word(&files[near])
         ),
     };
     StackFigures {

@@ -148,6 +148,22 @@ fn a_learned_lens_takes_neither_another_point_spread_function_nor_a_region_of_av
 }
 
 #[test]
+fn a_tone_curve_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = settings(folder.path());
+    for (exponent, is_named) in [(1.0, false), (2.2, true)] {
+        for (file, image) in [&settings.far, &settings.near].into_iter().zip(tone::tests::pair(exponent)) {
+            let codes = image.mapv(|value| (65_535.0 * value) as u16);
+            fs::write(file, encode_png(codes.view(), 16).unwrap()).unwrap();
+        }
+        let out = Some(folder.path().join(exponent.to_string()));
+        let figures = compute(&DepthRequest { out, ..settings.clone() }, &Context::unattended()).unwrap();
+        let found = figures.warnings.iter().any(|warning| warning.contains("not linear in light"));
+        assert_eq!(found, is_named, "{exponent}: {:?}", figures.warnings);
+    }
+}
+
+#[test]
 fn averaging_to_a_small_blur_is_doubted() {
     let optics: Optics = toml::from_str(OPTICS).unwrap();
     let doubts = |bin: Option<usize>, is_mosaic: bool| {

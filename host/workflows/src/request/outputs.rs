@@ -27,15 +27,16 @@ pub fn check<R: Request>(request: &R) -> Result<()> {
             }
         }
     }
-    let current = std::env::current_dir().unwrap_or_default();
     let inputs = request.inputs();
-    for (name, path) in files(&outputs) {
-        if let Some(input) = inputs.iter().find(|input| replaces(&current, path, input)) {
-            let expected = format!("it would replace the input {}: name another file", input.display());
-            return Err(WorkflowError::parameter(name, path.display(), expected));
-        }
-    }
-    Ok(())
+    files(&outputs).try_for_each(|(name, path)| check_inputs(name, path, &inputs))
+}
+
+/// Checks that a file written to `path` replaces no input.
+pub(crate) fn check_inputs(name: &'static str, path: &Path, inputs: &[PathBuf]) -> Result<()> {
+    let current = std::env::current_dir().unwrap_or_default();
+    let Some(input) = inputs.iter().find(|input| replaces(&current, path, input)) else { return Ok(()) };
+    let expected = format!("it would replace the input {}: name another file", input.display());
+    Err(WorkflowError::parameter(name, path.display(), expected))
 }
 
 /// Checks before the work of a command that each result file can be written after it. Batch makes folders itself.
@@ -59,6 +60,10 @@ pub(crate) fn check_folder(name: &'static str, path: &Path) -> Result<()> {
     }
     if path.is_dir() {
         return unusable("it is a folder: name a file".into());
+    }
+    // A rename would replace the device. In /dev even a link to a file is the system's.
+    if path.exists() && !path.is_file() || folder == Path::new("/dev") {
+        return unusable("it is a device, a pipe or a socket: name a file".into());
     }
     // Only writing shows that the folder can be written to.
     Staging::into_folder(folder)?;
@@ -202,6 +207,18 @@ mod tests {
             assert!(check_folders(&sample(plot)).is_ok());
         }
         assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 2, "nothing is left behind");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_device_is_not_replaced() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let socket = folder.path().join("socket");
+        let _listener = std::os::unix::net::UnixListener::bind(&socket).expect("a writable folder");
+        for place in [socket, "/dev/null".into(), "/dev/stdout".into()] {
+            let error = check_folder("plot", &place).expect_err("refused");
+            assert!(error.is_usage() && error.to_string().contains("name a file"), "{error}");
+        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Cameras that users can name for a rig.
 
 use std::{
+    collections::BTreeMap,
     path::{Path, PathBuf},
     str::FromStr,
     time::Duration,
@@ -66,7 +67,7 @@ impl FromStr for CameraAddress {
 
 impl CameraAddress {
     /// Opens the camera; `None` for the emulated rig's camera.
-    pub fn open(&self) -> Result<Option<Box<dyn Camera>>> {
+    pub fn open(&self) -> Result<Option<Box<dyn Camera + Send>>> {
         Ok(Some(match self {
             Self::Emulated => return Ok(None),
             Self::Endpoint(address) => Box::new(SimCamera::connect(address)?),
@@ -79,23 +80,23 @@ impl CameraAddress {
 }
 
 #[cfg(all(feature = "v4l2", target_os = "linux"))]
-fn open_v4l(device: &Path) -> Result<Box<dyn Camera>> {
+fn open_v4l(device: &Path) -> Result<Box<dyn Camera + Send>> {
     Ok(Box::new(farnear_capture::camera::V4lCamera::open(device)?))
 }
 
 #[cfg(not(all(feature = "v4l2", target_os = "linux")))]
-fn open_v4l(device: &Path) -> Result<Box<dyn Camera>> {
+fn open_v4l(device: &Path) -> Result<Box<dyn Camera + Send>> {
     farnear_capture::camera::v4l::check_path(device)?; // errors of the device first
     Err(not_built("v4l", device.display(), "v4l2"))
 }
 
 #[cfg(feature = "genicam")]
-fn open_genicam(id: &str) -> Result<Box<dyn Camera>> {
+fn open_genicam(id: &str) -> Result<Box<dyn Camera + Send>> {
     Ok(Box::new(farnear_capture::camera::GenicamCamera::open(id)?))
 }
 
 #[cfg(not(feature = "genicam"))]
-fn open_genicam(id: &str) -> Result<Box<dyn Camera>> {
+fn open_genicam(id: &str) -> Result<Box<dyn Camera + Send>> {
     Err(not_built("genicam", id, "genicam"))
 }
 
@@ -164,7 +165,7 @@ impl CameraSettings {
         optics: Option<&GivenOptics>,
         context: &Context<'_>,
     ) -> Result<EquippedRig> {
-        self.open_early(address)?.connect(address, optics, context)
+        self.open_early(address, context)?.connect(address, optics, context)
     }
 
     /// The light of the request; without one that of the optics file.
@@ -175,7 +176,12 @@ impl CameraSettings {
         }
     }
 
-    pub fn open_early(&self, rig: &RigAddress) -> Result<EarlyCamera> {
+    /// Values of `settings` by their names, for a capture's record.
+    pub(super) fn recorded_settings(&self) -> BTreeMap<String, String> {
+        self.settings.iter().map(|setting| (setting.name().to_owned(), setting.value())).collect()
+    }
+
+    pub fn open_early(&self, rig: &RigAddress, context: &Context<'_>) -> Result<EarlyCamera> {
         let other = match (&self.address, rig) {
             (CameraAddress::Emulated, RigAddress::Open(open)) if !open.is_emulated() => {
                 Some(open.name().to_owned())
@@ -195,7 +201,16 @@ impl CameraSettings {
                 "the board's pulse is the exposure: set it where the other exposures are set".to_string();
             return Err(WorkflowError::parameter("exposure_us", exposure.value(), expected));
         }
-        let camera = self.address.open()?.map(|camera| self.set_up(camera)).transpose()?;
+        let opened = match &self.address {
+            // A silent address takes seconds.
+            CameraAddress::Endpoint(_) | CameraAddress::Genicam(_) => {
+                let address = self.address.clone();
+                context.cancel.watch("opening the camera", move || address.open())??
+            }
+            // A program would outlive a thread that is left behind.
+            other => other.open()?,
+        };
+        let camera = opened.map(|camera| self.set_up(camera)).transpose()?;
         Ok(EarlyCamera { camera, settings: self.clone() })
     }
 
@@ -206,6 +221,10 @@ impl CameraSettings {
 }
 
 impl EarlyCamera {
+    pub(super) fn kind(&self) -> &'static str {
+        self.camera.as_ref().map_or("sim", |camera| camera.kind())
+    }
+
     /// Connects to the rig; without a named camera, uses the emulated rig's.
     pub fn connect(
         self,
@@ -280,5 +299,24 @@ impl EquippedRig {
             simulation: self.rig.emulation.as_ref().map(|(_, scenery)| scenery.decided(psf)),
             optics,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Instant;
+
+    use super::*;
+
+    #[test]
+    fn cancelling_ends_the_wait_for_a_camera_that_does_not_answer() {
+        // No host has this address (RFC 5737).
+        let address = "192.0.2.1:9".parse().unwrap();
+        let context = Context::unattended();
+        context.cancel.cancel();
+        let begin = Instant::now();
+        let settings = CameraSettings { address, ..CameraSettings::default() };
+        assert!(settings.open_early(&RigAddress::Attached, &context).is_err());
+        assert!(begin.elapsed() < Duration::from_secs(2), "{:?}", begin.elapsed());
     }
 }

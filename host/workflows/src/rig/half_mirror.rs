@@ -50,7 +50,8 @@ pub(super) fn capture(settings: &CaptureRequest, context: &Context<'_>) -> Resul
         }
         other => other.clone(),
     };
-    let (early, early_second) = (camera.open_early(&address)?, second.open_early(&address)?);
+    let early = camera.open_early(&address, context)?;
+    let early_second = second.open_early(&address, context)?;
     let (mut equipped, mut second) = early.connect_both(early_second, &address, Some(&optics), context)?;
     let exposures = Exposures {
         exposure: camera.exposure,

@@ -280,8 +280,7 @@ pub(super) fn noted(
     let circumstances = equipped.circumstances(optics.optics.psf(), optics.table.clone());
     let mut record = record_of(pair, &equipped.rig.client, circumstances);
     record.camera.averaged = (averaged > 1).then_some(averaged);
-    record.camera.settings =
-        settings.settings.iter().map(|setting| (setting.name().to_owned(), setting.value())).collect();
+    record.camera.settings = settings.recorded_settings();
     record
 }
 

@@ -155,7 +155,7 @@ pub fn read_record(path: &Path) -> Result<QualityRecord> {
 pub fn measure(request: &QualityRequest, context: &Context<'_>) -> Result<QualityFigures> {
     request.check()?;
     let optics = GivenOptics::read(&request.optics)?;
-    let mut record = read_record(&request.record)?;
+    read_record(&request.record)?;
     let method = DepthMethod::Whitened;
     let computation = MeasureSettings { window: method.usual_window(), ..MeasureSettings::default() };
     let mut rig = request.camera.connect(&request.rig, Some(&optics), context)?;
@@ -182,9 +182,15 @@ pub fn measure(request: &QualityRequest, context: &Context<'_>) -> Result<Qualit
     if let Some(warning) = found.warning() {
         context.progress.warn(&warning);
     }
-    record.measurements.push(found.clone());
-    write_file(&request.record, toml::to_string(&record)?.as_bytes())?;
+    append(&request.record, found.clone())?;
     Ok(found)
+}
+
+/// Reads the record again: another run may have appended to it since.
+fn append(path: &Path, found: QualityFigures) -> Result<()> {
+    let mut record = read_record(path)?;
+    record.measurements.push(found);
+    Ok(write_file(path, toml::to_string(&record)?.as_bytes())?)
 }
 
 fn figures(
@@ -294,10 +300,11 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("quality.toml");
         assert_eq!(read_record(&path).unwrap(), QualityRecord::default());
-        let measurements = vec![figures(&maps(1.0), None, PROJECTION, None).unwrap()];
-        let record = QualityRecord { measurements };
-        std::fs::write(&path, toml::to_string(&record).unwrap()).unwrap();
-        assert_eq!(read_record(&path).unwrap(), record);
+        let measurements = [1.0, 2.0].map(|noise| figures(&maps(noise), None, PROJECTION, None).unwrap());
+        for found in measurements.clone() {
+            append(&path, found).unwrap();
+        }
+        assert_eq!(read_record(&path).unwrap().measurements, measurements);
         std::fs::write(&path, "measurement = 3").unwrap();
         assert!(read_record(&path).is_err());
     }

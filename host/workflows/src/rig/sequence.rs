@@ -173,7 +173,7 @@ pub(super) fn take(
     let mut taken = Taken { folder, shots: Vec::new(), first: None };
     for run in 0..settings.runs {
         context.info(&format!("running {} shots", shots.len()));
-        let name = |name: String| if settings.runs > 1 { format!("run-{run:02}-{name}") } else { name };
+        let name = |name: String| name_in_run(run, settings.runs, name);
         run_once(rig, shots, settings, name, &mut taken, context)?;
     }
     let (psf, table) = match optics {
@@ -192,6 +192,12 @@ pub(super) fn take(
     finish_sequence(folder, &record)?;
     context.info(&format!("wrote {}", settings.out.display()));
     Ok(taken)
+}
+
+/// File name of an image of a run; the names of all `runs` sort in their order.
+fn name_in_run(run: usize, runs: usize, name: String) -> String {
+    let digits = runs.saturating_sub(1).to_string().len().max(2);
+    if runs > 1 { format!("run-{run:0digits$}-{name}") } else { name }
 }
 
 /// Shots whose images are in the folder.
@@ -252,5 +258,17 @@ fn figures(shots: &[Shot], taken: &[SequenceShot]) -> SequenceFigures {
         board_ms: (end - begin) as f64 / 1e3,
         longest_settle_ms: f64::from(records().map(|r| r.settle.0).max().unwrap_or(0)) / 1e3,
         largest_error_um: f64::from(error_nm.max().unwrap_or(0)) / 1e3,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_names_of_the_images_sort_by_run() {
+        let names = |runs| (0..runs).map(|run| name_in_run(run, runs, "a".into())).collect::<Vec<_>>();
+        assert_eq!([&*names(1)[0], &*names(2)[1], &*names(101)[7]], ["a", "run-01-a", "run-007-a"]);
+        assert!(names(101).is_sorted());
     }
 }

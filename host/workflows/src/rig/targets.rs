@@ -1,11 +1,12 @@
 //! Flat targets for a depth correction: a pair and depth map at each distance, and their list.
 
 use std::{
+    collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
 };
 
-use farnear_capture::record::{begin_folder, finish_folder, read_record};
+use farnear_capture::record::{CaptureRecord, begin_folder, finish_folder, read_record};
 use farnear_depth::{
     operators::Operators,
     optics::Optics,
@@ -13,6 +14,7 @@ use farnear_depth::{
     validity::LARGEST_ALPHA,
 };
 use farnear_files::{npy, staging};
+use farnear_protocol::message::LightLevels;
 use ndarray::Array2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -87,8 +89,9 @@ crate::request::camera_request!(TargetSeriesRequest);
 pub struct TargetFigures {
     pub targets: usize,
     pub captured: usize,
-    /// Root-mean-square error before correction, of the maps captured in this run.
-    pub rmse_mm: f64,
+    /// Root-mean-square error before correction, of the maps captured in this run; `None` without a depth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rmse_mm: Option<f64>,
     pub patterns: String,
 }
 
@@ -109,11 +112,14 @@ fn name(true_mm: f64) -> String {
 }
 
 impl List {
-    fn has(&self, true_mm: f64) -> bool {
-        self.pattern.iter().any(|entry| (entry.true_mm - true_mm).abs() < 1e-6)
+    /// Whether the target is listed and its map was not removed.
+    fn has(&self, out: &Path, true_mm: f64) -> bool {
+        let mut same = self.pattern.iter().filter(|entry| name(entry.true_mm) == name(true_mm));
+        same.any(|entry| out.join(&entry.depth).is_file())
     }
 
     fn add(&mut self, out: &Path, true_mm: f64) -> Result<()> {
+        self.pattern.retain(|entry| name(entry.true_mm) != name(true_mm));
         self.pattern.push(Entry { depth: Path::new(&name(true_mm)).join("depth.npy"), true_mm });
         self.pattern.sort_by(|a, b| a.true_mm.total_cmp(&b.true_mm));
         Ok(staging::write_file(&out.join(LIST), toml::to_string(self)?.as_bytes())?)
@@ -122,7 +128,7 @@ impl List {
     /// Adds targets that were captured when a run ended before it listed them.
     fn add_complete(&mut self, out: &Path, distances_mm: &[f64]) -> Result<()> {
         for true_mm in distances_mm.iter().copied() {
-            if !self.has(true_mm) && out.join(name(true_mm)).is_dir() {
+            if !self.has(out, true_mm) && out.join(name(true_mm)).join("depth.npy").is_file() {
                 self.add(out, true_mm)?;
             }
         }
@@ -136,12 +142,12 @@ pub fn capture(settings: &TargetSeriesRequest, context: &Context<'_>) -> Result<
     let optics = GivenOptics::read(&settings.optics)?;
     let operators = operators::find(None, &optics.optics)?;
     let distances_mm = distances(&settings.distances, &optics.optics)?;
-    let early = settings.camera.open_early(&settings.rig)?;
+    let early = settings.camera.open_early(&settings.rig, context)?;
     fs::create_dir_all(&settings.out)
         .map_err(|source| WorkflowError::Folder { folder: settings.out.clone(), source })?;
     let mut list = read_list(&settings.out.join(LIST))?;
     list.add_complete(&settings.out, &distances_mm)?;
-    check_same_optics(&list, &optics, settings)?;
+    check_alike(&list, &optics, settings, early.kind())?;
     let series = Series { settings, optics: &optics, operators: &operators, context };
     let mut standing = match settings.rig.is_emulated() {
         true => None,
@@ -149,7 +155,7 @@ pub fn capture(settings: &TargetSeriesRequest, context: &Context<'_>) -> Result<
     };
     let (mut captured, mut error) = (0, MeanSquare::default());
     for (number, true_mm) in distances_mm.iter().copied().enumerate() {
-        if list.has(true_mm) {
+        if list.has(&settings.out, true_mm) {
             context.info(&format!("target {} at {true_mm} mm is there already", number + 1));
             continue;
         }
@@ -169,7 +175,7 @@ pub fn capture(settings: &TargetSeriesRequest, context: &Context<'_>) -> Result<
     Ok(TargetFigures {
         targets: list.pattern.len(),
         captured,
-        rmse_mm: rounded(error.root(), 4),
+        rmse_mm: error.root().map(|mm| rounded(mm, 4)),
         patterns: settings.out.join(LIST).display().to_string(),
     })
 }
@@ -230,8 +236,8 @@ impl MeanSquare {
         }
     }
 
-    fn root(&self) -> f64 {
-        (self.sum / f64::max(self.pixels, 1.0)).sqrt()
+    fn root(&self) -> Option<f64> {
+        (self.pixels > 0.0).then(|| (self.sum / self.pixels).sqrt())
     }
 }
 
@@ -260,21 +266,52 @@ fn distances(asked_mm: &[f64], optics: &Optics) -> Result<Vec<f64>> {
     Ok((0..USUAL_TARGETS).map(|i| rounded(range.near_mm + step * i as f64, 1)).collect())
 }
 
-/// Fails if the series was begun with other optics.
-fn check_same_optics(list: &List, optics: &GivenOptics, settings: &TargetSeriesRequest) -> Result<()> {
+/// Fails if the series was begun in another way: the correction would learn the difference.
+fn check_alike(list: &List, optics: &GivenOptics, request: &TargetSeriesRequest, kind: &str) -> Result<()> {
     for entry in &list.pattern {
         let folder = entry.depth.parent().unwrap_or(Path::new(""));
-        let record = read_record(&settings.out.join(folder))?;
-        if record.is_some_and(|record| record.optics != optics.table) {
+        let Some(record) = read_record(&request.out.join(folder))? else { continue };
+        if let Some((name, value, was)) = difference(&record, optics, request, kind) {
             let expected = format!(
-                "the target at {} mm in {} was captured with other optics: take these, or another folder",
+                "the target at {} mm in {} was captured with {was}: take the same, or another folder",
                 entry.true_mm,
-                settings.out.display()
+                request.out.display()
             );
-            return Err(WorkflowError::parameter("optics", settings.optics.display(), expected));
+            return Err(WorkflowError::parameter(name, value, expected));
         }
     }
     Ok(())
+}
+
+/// Name and value of the first setting that differs from the record's, and that of the record.
+fn difference(
+    record: &CaptureRecord,
+    optics: &GivenOptics,
+    request: &TargetSeriesRequest,
+    kind: &str,
+) -> Option<(&'static str, String, String)> {
+    let (was, exposure_us) = (&record.camera, request.camera.exposure.0);
+    if record.optics != optics.table {
+        return Some(("optics", request.optics.display().to_string(), "other optics".into()));
+    }
+    if was.kind != kind {
+        return Some(("camera", kind.into(), format!("a camera of the kind `{}`", was.kind)));
+    }
+    if let Some(other) = record.exposure.iter().find(|exposure| exposure.exposure_us != exposure_us) {
+        return Some(("exposure_us", exposure_us.to_string(), format!("{} us", other.exposure_us)));
+    }
+    let light = request.camera.light_with(Some(optics)).map(LightLevels::percent);
+    if was.light_percent != light {
+        let percent = |light: Option<[f64; 2]>| light.map_or(String::from("0"), |[a, b]| format!("{a},{b}"));
+        return Some(("light", percent(light), format!("light {}", percent(was.light_percent))));
+    }
+    let settings = request.camera.recorded_settings();
+    let text = |settings: &BTreeMap<String, String>| {
+        let each: Vec<String> = settings.iter().map(|(name, value)| format!("{name}={value}")).collect();
+        if each.is_empty() { String::from("nothing") } else { each.join(" ") }
+    };
+    let (now, before) = (text(&settings), text(&was.settings));
+    (was.settings != settings).then(|| ("set", now, format!("{before} set")))
 }
 
 fn read_list(path: &Path) -> Result<List> {
@@ -287,6 +324,8 @@ fn read_list(path: &Path) -> Result<List> {
 
 #[cfg(test)]
 mod tests {
+    use farnear_protocol::{Micros, message::LIGHT_LEVEL_MAX};
+
     use super::*;
 
     #[test]
@@ -306,10 +345,17 @@ mod tests {
         assert!(error.contains("expected at least 955 mm"), "{error}");
     }
 
+    fn captured(out: &Path, true_mm: f64) {
+        fs::create_dir(out.join(name(true_mm))).unwrap();
+        fs::write(out.join(name(true_mm)).join("depth.npy"), "a map").unwrap();
+    }
+
     #[test]
     fn a_target_that_was_not_listed_before_the_end_of_a_run_is_listed() {
         let out = tempfile::tempdir().unwrap();
-        fs::create_dir(out.path().join("target-900.000")).unwrap();
+        captured(out.path(), 890.0);
+        captured(out.path(), 900.0);
+        fs::create_dir(out.path().join("target-910.000")).unwrap();
         let mut list = List::default();
         list.add(out.path(), 890.0).unwrap();
         list.add_complete(out.path(), &[890.0, 900.0, 910.0]).unwrap();
@@ -317,4 +363,94 @@ mod tests {
         assert_eq!(listed.pattern.iter().map(|entry| entry.true_mm).collect::<Vec<_>>(), [890.0, 900.0]);
         assert_eq!(listed.pattern[1].depth, Path::new("target-900.000/depth.npy"));
     }
+
+    #[test]
+    fn a_target_whose_folder_was_removed_is_captured_again() {
+        let out = tempfile::tempdir().unwrap();
+        captured(out.path(), 900.0);
+        let mut list = List::default();
+        list.add(out.path(), 900.0).unwrap();
+        assert!(list.has(out.path(), 900.0) && list.has(out.path(), 900.0001), "the folder has three digits");
+        fs::remove_dir_all(out.path().join("target-900.000")).unwrap();
+        assert!(!list.has(out.path(), 900.0));
+        list.add(out.path(), 900.0).unwrap();
+        assert_eq!(list.pattern.len(), 1);
+    }
+
+    #[test]
+    fn without_a_depth_there_is_no_error_of_depth() {
+        let mut error = MeanSquare::default();
+        error.add(&Array2::from_elem((2, 2), f32::NAN), 900.0);
+        assert_eq!(error.root(), None);
+        error.add(&ndarray::array![[903.0, f32::NAN], [896.0, f32::NAN]], 900.0);
+        assert_eq!(error.root(), Some(12.5_f64.sqrt()));
+    }
+
+    #[test]
+    fn a_series_continues_only_with_the_settings_of_its_beginning() {
+        let out = tempfile::tempdir().unwrap();
+        let text = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n[focus]\nfar_mm = 933.0\nmax_blur_px = 2.703\n";
+        let optics = GivenOptics::parse(text, Path::new("optics.toml")).unwrap();
+        captured(out.path(), 900.0);
+        let mut list = List::default();
+        list.add(out.path(), 900.0).unwrap();
+        let record = format!("{RECORD}{}", text.replace('[', "[optics."));
+        fs::write(out.path().join("target-900.000/capture.toml"), record).unwrap();
+        let request = |camera: CameraSettings| TargetSeriesRequest {
+            camera,
+            optics: "optics.toml".into(),
+            out: out.path().into(),
+            ..TargetSeriesRequest::default()
+        };
+        let usual = CameraSettings { settings: vec!["gain=2".parse().unwrap()], ..CameraSettings::default() };
+        let check = |camera: CameraSettings, kind| {
+            check_alike(&list, &optics, &request(camera), kind).map_err(|error| error.to_string())
+        };
+        assert_eq!(check(usual.clone(), "sim"), Ok(()));
+        let error = check(usual.clone(), "folder").unwrap_err();
+        assert!(error.starts_with("camera folder:") && error.contains("900 mm"), "{error}");
+        let other = [
+            (CameraSettings { exposure: Micros(1000), ..usual.clone() }, "exposure_us 1000:", "with 5000 us"),
+            (CameraSettings { settings: Vec::new(), ..usual.clone() }, "set nothing:", "with gain=2 set"),
+            (CameraSettings { light: Some(LIT), ..usual }, "light 100,0:", "with light 0"),
+        ];
+        for (camera, name, was) in other {
+            let error = check(camera, "sim").unwrap_err();
+            assert!(error.starts_with(name) && error.contains(was), "{error}");
+        }
+    }
+
+    const LIT: LightLevels = LightLevels { first: LIGHT_LEVEL_MAX, second: 0 };
+    const RECORD: &str = r#"format = 2
+made_by = "farnear"
+[stage]
+datum_mm = 47.0
+coarse_measured_um = 5800.0
+[[exposure]]
+image = "far.png"
+sensor_measured_mm = 52.8
+fine_measured_um = 21.9
+coarse_measured_um = 5800.0
+settle_us = 14590
+exposure_us = 5000
+trigger_number = 0
+trigger_us = 1
+strobe_start_us = 2
+strobe_end_us = 5002
+[camera]
+kind = "sim"
+width = 640
+height = 480
+bits = 8
+settings = { gain = "2" }
+[board]
+name = "nucleo-f429zi"
+firmware = "0.2.0"
+protocol = 3
+schema_key = "0"
+unique_id = "0"
+boot = 1
+reset_cause = "power on"
+emulated = true
+"#;
 }

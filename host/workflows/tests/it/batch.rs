@@ -105,6 +105,16 @@ fn a_report_replaces_only_an_earlier_one() {
 }
 
 #[test]
+fn a_place_for_failures_is_made_before_the_jobs() {
+    let root = folder();
+    let manifest = manifest(root.path(), &[("a", "one"), ("gone", "two")]);
+    let failures = root.path().join("logs/failures.jsonl");
+    let given = BatchSettings { failures: Some(failures.clone()), ..settings(&manifest) };
+    assert_eq!(states(&run(&given).unwrap()), [State::Done, State::Failed]);
+    assert!(failures.exists());
+}
+
+#[test]
 fn the_first_of_two_jobs_with_one_place_has_it() {
     let root = folder();
     let absolute = root.path().join("one").display().to_string();

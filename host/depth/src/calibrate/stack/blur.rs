@@ -7,19 +7,17 @@ use serde::{Deserialize, Serialize};
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use super::StackError;
 use super::focus_plane::{FocusPlane, middle};
+use super::{LEAST_SIDE, StackError};
 use crate::calibrate::spectra;
 use crate::fourier::Complex64;
 use crate::measure::binned;
-use crate::prepare::{align, warp};
+use crate::prepare::{align, band::without_holes, warp};
 
 /// Frequencies that are compared, rad/px.
 const BAND: [f64; 2] = [0.15, 1.2];
 /// Largest radius, px, that the band measures well; larger ones are measured in binned images.
 const LARGEST_PX: f64 = 5.0;
-/// Least side of a binned image, px.
-const LEAST_SIDE: usize = 64;
 /// Least rings of frequencies with a ratio for a slope.
 const LEAST_RINGS: usize = 3;
 
@@ -76,7 +74,9 @@ impl BlurCurve {
                     .flatten()
                     .filter(|found| found.correlation > 0.3);
                 let aligned = match found {
-                    Some(found) => filled(warp::resample(slice.view(), &found.warp)),
+                    Some(found) => {
+                        without_holes(warp::resample(slice.view(), &found.warp).view()).into_owned()
+                    }
                     None => slice,
                 };
                 Ok(BlurPoint { slices: index as f64 - focus, radius_px: radius(&spectra, &aligned) })
@@ -106,13 +106,6 @@ impl BlurCurve {
         }
         Ok(Self { points, per_slice_px })
     }
-}
-
-/// The image with its mean where it has no value.
-fn filled(image: Array2<f32>) -> Array2<f32> {
-    let finite = || image.iter().filter(|v| v.is_finite());
-    let mean = (finite().map(|v| f64::from(*v)).sum::<f64>() / finite().count() as f64) as f32;
-    image.mapv(|v| if v.is_finite() { v } else { mean })
 }
 
 /// Radius in px, in the least binned image in which it is small. `spectra` are those of the sharpest slice by binning.

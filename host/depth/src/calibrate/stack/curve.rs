@@ -6,6 +6,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::response::Sample;
+use crate::median::median;
 use crate::optics::{Coarser, RESPONSE_POINTS, Stage};
 
 /// Extent of the response beyond the learned depths, in normalised depth.
@@ -156,8 +157,7 @@ fn polynomial(points: impl Iterator<Item = [f64; 2]> + Clone, degree: usize) -> 
             normal[(i, i)] += if i > 1 { 1e-4 } else { 1e-9 } * sizes.len() as f64;
         }
         found = normal.lu().solve(&right)?.iter().copied().collect();
-        let middle = sizes.len() / 2;
-        limit = (1.5 * 1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1).max(1e-4);
+        limit = (1.5 * 1.4826 * median(sizes, f64::total_cmp)?).max(1e-4);
     }
     Some(found)
 }

@@ -1,14 +1,17 @@
 //! Depth from focus of a flat target: the slice of most detail per block, and the plane through all blocks. Detail is
 //! the energy of a Laplacian. Its scale and the size of the blocks are those with the least standard error of the plane:
-//! fine ones are the sharpest measure of focus, coarse ones remain where noise hides fine detail.
+//! fine ones are the sharpest measure of focus, coarse ones remain where noise hides fine detail. Energy grows with the square
+//! of brightness, so that vignetting which changes with focus would move the plane: it is relative to the block's brightness.
 
 use nalgebra::{DMatrix, DVector};
-use ndarray::{Array2, s};
+use ndarray::{Array2, Zip, s};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::StackError;
 use crate::border::reflect;
+use crate::brightness::mean;
+use crate::median::deviation;
 
 /// Side of the smallest block in parts of the shorter side.
 const BLOCKS: usize = 24;
@@ -23,6 +26,9 @@ const PEAK: f64 = 1.3;
 /// Least height of a peak in standard deviations of the curve's noise. Curves of few slices, whose peak is sharp, have
 /// large second differences without noise.
 const ABOVE_NOISE: f64 = 10.0;
+
+/// Brightness of a block relative to the other slices that vignetting and the lamp explain.
+const VIGNETTING: [f64; 2] = [0.5, 2.0];
 
 /// The slice in focus, from 0, at column x and row y: `x_per_px x + y_per_px y + at_origin`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -56,6 +62,7 @@ impl FocusPlane {
     pub fn of(slices: &[Array2<f32>], proceed: &(dyn Fn() -> bool + Sync)) -> Result<Self, StackError> {
         let (height, width) = slices[0].dim();
         let side = (height.min(width) / BLOCKS).clamp(12, 64);
+        let brightness = brightness(slices, side);
         let mut smooth: Vec<Array2<f32>> = slices.to_vec();
         let mut best: Option<(f64, Self)> = None;
         let (mut most, mut of_most) = (0, 0);
@@ -66,7 +73,9 @@ impl FocusPlane {
                 smooth = slices.collect::<Option<_>>().ok_or(StackError::Stopped)?;
                 passes += 1;
             }
-            let energies = smooth.par_iter().map(|slice| proceed().then(|| laplacian_energy(slice, side)));
+            let energies = smooth.par_iter().zip(&brightness).map(|(slice, brightness)| {
+                proceed().then(|| laplacian_energy(slice, side) / (brightness * brightness))
+            });
             let energies: Vec<Array2<f64>> = energies.collect::<Option<_>>().ok_or(StackError::Stopped)?;
             for merged in MERGED {
                 let points = peaks(&energies, merged, side);
@@ -152,16 +161,14 @@ fn fit(points: &[[f64; 3]]) -> FocusPlane {
         found = [c[0], c[1], c[2]];
         let errors: Vec<f64> =
             points.iter().map(|[x, y, z]| z - found[0] * x - found[1] * y - found[2]).collect();
-        let mut sizes: Vec<f64> = errors.iter().map(|e| e.abs()).collect();
-        sizes.sort_by(f64::total_cmp);
-        spread = 1.4826 * sizes[sizes.len() / 2];
+        spread = deviation(errors.iter().copied()).unwrap_or(0.0);
         let limit = (4.0 * spread).max(1e-6);
         weights = errors.iter().map(|e| (1.0 - (e / limit).powi(2)).max(0.0).powi(2)).collect();
     }
     FocusPlane { x_per_px: found[0], y_per_px: found[1], at_origin: found[2], spread, blocks: points.len() }
 }
 
-/// Slices of a map of blocks, for tests and blur.
+/// The square in the middle of an image.
 pub(super) fn middle(image: &Array2<f32>) -> Array2<f32> {
     let (height, width) = image.dim();
     let side = height.min(width);
@@ -182,6 +189,23 @@ pub(super) fn blurred(image: &Array2<f32>) -> Array2<f32> {
         })
     };
     pass(&pass(image, 1, 0), 0, 1)
+}
+
+/// Mean of the blocks of each slice, relative to its mean over the slices and within [`VIGNETTING`]; 1 without light.
+fn brightness(slices: &[Array2<f32>], side: usize) -> Vec<Array2<f64>> {
+    let of_blocks =
+        |slice: &Array2<f32>| Zip::from(slice.exact_chunks((side, side))).map_collect(|block| mean(block));
+    let means: Vec<Array2<f64>> = slices.par_iter().map(of_blocks).collect();
+    let sum = means.iter().fold(Array2::<f64>::zeros(means[0].dim()), |sum, means| sum + means);
+    let usual = sum / slices.len() as f64;
+    let relative = |own: f64, usual: f64| {
+        let relative = own / usual;
+        if relative > 0.0 { relative.clamp(VIGNETTING[0], VIGNETTING[1]) } else { 1.0 }
+    };
+    means
+        .iter()
+        .map(|means| Zip::from(means).and(&usual).map_collect(|own, usual| relative(*own, *usual)))
+        .collect()
 }
 
 /// Sum of squares over blocks of the Laplacian.

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::ENOUGH_DEPTHS;
 use super::curve::{Curve, by_texture};
 use super::response::{LEARNED, Sample, Samples, WORTH};
-use crate::median::median;
+use crate::median::{deviation, median};
 use crate::optics::{Optics, Stage, unexplained};
 use crate::validity::model_error;
 
@@ -74,6 +74,8 @@ pub(super) struct Judged {
     pub error: f64,
     truth: f64,
     pub noise: f64,
+    /// Slope of the response, of depth over measured depth.
+    pub slope: f64,
     unexplained: f32,
     pub original: bool,
 }
@@ -128,12 +130,13 @@ fn tested(stage: &Stage, s: &Sample) -> Option<Judged> {
         truth: s.truth,
         original: s.original,
         noise,
+        slope,
         unexplained: unexplained(s.misfit, noise as f32),
     })
 }
 
 pub(super) fn robust(errors: impl Iterator<Item = f64>) -> f64 {
-    1.4826 * median(errors.map(f64::abs).collect(), f64::total_cmp).unwrap_or(f64::NAN)
+    deviation(errors).unwrap_or(f64::NAN)
 }
 
 fn rms(judged: &[Judged]) -> f64 {

@@ -12,14 +12,14 @@ use super::StackError;
 use super::curve::Curve;
 use super::focus_plane::{FocusPlane, blurred};
 use super::foreign;
-use super::held_out::{HeldOut, Split, finish, judge, robust};
+use super::held_out::{HeldOut, Judged, Split, finish, judge, robust};
 use crate::adaptive_window::{Bank, LEARNED_PX, Window};
 use crate::coarseness::coarseness;
 use crate::measure::{DepthMethod, MeasureSettings, measure};
 use crate::median::median;
 use crate::optics::{Optics, Stage};
 use crate::pipeline::Settings;
-use crate::prepare::{PrepareSettings, Prepared, prepare_owned};
+use crate::prepare::{PrepareSettings, Prepared, prepare};
 use crate::psf::Psf;
 
 /// Side of a checkerboard block, px: larger than the windows' reach.
@@ -253,10 +253,12 @@ pub(super) fn learn(target: &Target<'_>) -> Result<Learned, StackError> {
     Ok(Learned { optics: optics.with_stage(stage), held_out, trials, foreign })
 }
 
-/// Difference between windows that the model's error explains; `None` if noise explains most of it.
+/// Difference between windows, in measured depth, that the model's error explains; `None` if noise explains most of it.
 fn tolerance(small: &Best) -> Option<f64> {
     let (judged, _) = judge(&small.samples, small.degree, Split::Blocks, false)?;
-    let errors: Vec<[f64; 2]> = judged.iter().filter(|j| j.original).map(|j| [j.error, j.noise]).collect();
+    // Windows are compared before the response, which stretches depth several times for an aberrated lens.
+    let measured = |j: &Judged| [j.error / j.slope, j.noise / j.slope];
+    let errors: Vec<[f64; 2]> = judged.iter().filter(|j| j.original).map(measured).collect();
     let error = beyond_noise(&errors);
     let usual = median(errors.iter().map(|[_, noise]| *noise).collect(), f64::total_cmp)?;
     (error > MODEL_LIMITED * usual).then(|| (TOLERATED * error).min(LARGEST_TOLERANCE))
@@ -303,7 +305,7 @@ impl Target<'_> {
                     return None;
                 }
                 let pair = [far, far + self.pair_step].map(|i| self.slices[i].clone());
-                let prepared = prepare_owned(pair, &optics, None, &settings).ok()?;
+                let prepared = prepare(pair, &optics, None, &settings).ok()?;
                 // Equals a target with coarser texture, because blur and smoothing commute.
                 let [far_image, near_image] = [&prepared.far, &prepared.near].map(blurred);
                 let noise = prepared.noise.scaled(SMOOTHED_NOISE);

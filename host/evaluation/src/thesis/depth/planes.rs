@@ -215,6 +215,10 @@ pub fn operators(page: &mut Page, planes: &Planes) -> Result<()> {
     Ok(())
 }
 
+fn row(claim: &str, holds: bool, here: String) -> Vec<String> {
+    vec![claim.to_owned(), if holds { "yes" } else { "no" }.to_owned(), here]
+}
+
 fn claims_of_5_4(page: &mut Page, all: &[Vec<(f64, Flat)>]) {
     let rmse = |of: usize| mean(all[of].iter().map(|(_, flat)| flat.rmse_mm));
     let [raj, gro, ggro, raj_after, gro_after, ggro_after] = [0, 1, 2, 3, 4, 5].map(rmse);
@@ -229,9 +233,6 @@ fn claims_of_5_4(page: &mut Page, all: &[Vec<(f64, Flat)>]) {
         let half = JUDGED / 2;
         let part = |part: &[(f64, Flat)]| mean(part.iter().map(|(_, flat)| flat.rmse_mm));
         [part(&all[of][..half]), part(&all[of][half..])]
-    };
-    let row = |claim: &str, holds: bool, here: String| {
-        vec![claim.to_owned(), if holds { "yes" } else { "no" }.to_owned(), here]
     };
     let ([far_before, near_before], [far_after, near_after]) = (halves(2), halves(5));
     let rows = [
@@ -312,7 +313,7 @@ pub fn depth_dependence(page: &mut Page, planes: &Planes) -> Result<()> {
         let all: Vec<f64> = blocks.collect();
         (all.iter().sum::<f64>() / all.len() as f64).sqrt()
     };
-    let row = |of: usize, name: &str| {
+    let end = |of: usize, name: &str| {
         let mut cells = vec![name.to_owned()];
         cells.extend(maps[of..of + 3].iter().map(|(_, map, _, true_mm)| mm(bowl(map, *true_mm))));
         cells
@@ -325,7 +326,7 @@ pub fn depth_dependence(page: &mut Page, planes: &Planes) -> Result<()> {
             "its own end's pattern",
             "the other end's pattern",
         ],
-        &[row(0, "far surface"), row(3, "near surface")],
+        &[end(0, "far surface"), end(3, "near surface")],
     );
     page.paragraph(
         "As in the thesis a pattern from the right depth flattens the surface and one from the other end of the range does not. (The surfaces lie a quarter of a step of \
@@ -395,9 +396,6 @@ pub fn corrections(page: &mut Page, planes: &Planes) -> Result<()> {
 }
 
 fn claims_of_6_4(page: &mut Page, figures: &[Vec<[f64; 2]>]) {
-    let row = |claim: &str, holds: bool, here: String| {
-        vec![claim.to_owned(), if holds { "yes" } else { "no" }.to_owned(), here]
-    };
     let reduced = figures.iter().filter(|f| f[1][0] < f[0][0] && f[2][0] < f[0][0]).count();
     let quieter = figures.iter().filter(|f| f[1][1] < f[0][1] && f[2][1] < f[0][1]).count();
     let cdc_first = figures[..3].iter().filter(|f| f[1][0] < f[2][0] && f[1][1] < f[2][1]).count();

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     page::{Page, mm},
-    panels::{self, Panel, Scale},
+    panels::{self, Scale},
     rig::Pair,
 };
 
@@ -78,7 +78,8 @@ const LINES: [Line; 8] = [
 pub struct Seen {
     name: &'static str,
     pair: Pair,
-    maps: Vec<(Method, &'static str, Array2<f32>)>,
+    /// Of figs. 6.7 and 6.8, with their titles.
+    maps: Vec<(String, Array2<f32>)>,
 }
 
 pub fn measure(page: &mut Page, bench: &Bench, planes: &Planes) -> Result<Vec<Seen>> {
@@ -136,7 +137,7 @@ fn chapter_6(
     pair: &Pair,
     bench: &Bench,
     planes: &Planes,
-) -> Result<Vec<(Method, &'static str, Array2<f32>)>> {
+) -> Result<Vec<(String, Array2<f32>)>> {
     let mut maps = Vec::new();
     if !["SC", "CD"].contains(&scene.name) {
         return Ok(maps);
@@ -146,7 +147,7 @@ fn chapter_6(
     let raw = raw.into_iter().collect::<Result<Vec<_>>>()?;
     for (way, taught) in [("", None), (", CDC", Some(Taught::Cdc)), (", CLSF", Some(Taught::Clsf))] {
         for (method, map) in &raw {
-            maps.push((*method, way, planes.corrected(*method, taught, map)?));
+            maps.push((format!("{}{way}", method.name()), planes.corrected(*method, taught, map)?));
         }
     }
     Ok(maps)
@@ -154,22 +155,12 @@ fn chapter_6(
 
 pub fn pictures(page: &mut Page, scenes: &[Seen]) -> Result<()> {
     page.subheading("Two scenes before and after correction (figs. 6.7 and 6.8)");
-    let range = [880.0, 940.0];
     for seen in scenes.iter().filter(|seen| !seen.maps.is_empty()) {
         let (file, figure) =
             if seen.name == "SC" { ("thesis-stair.png", "6.7") } else { ("thesis-circular.png", "6.8") };
-        let panels: Vec<Panel<'_>> = seen
-            .maps
-            .iter()
-            .map(|(method, way, map)| Panel {
-                title: format!("{}{way}", method.name()),
-                map: map.view(),
-                scale: Scale::Depth(range),
-            })
-            .collect();
         page.picture(
             file,
-            &panels::grid(4, &panels)?,
+            &panels::titled(4, &seen.maps, Scale::Depth([880.0, 940.0]))?,
             &format!(
                 "{}, fig. {figure}: Subbarao, Favaro, Raj and GGRO; as measured, after CDC (smoothed patterns), after CLSF; 880 mm (red) to 940 mm (blue)",
                 seen.name
@@ -181,7 +172,7 @@ pub fn pictures(page: &mut Page, scenes: &[Seen]) -> Result<()> {
         let mut rows = Vec::new();
         for (row, way) in ["uncorrected", "CDC, smoothed patterns", "CLSF"].into_iter().enumerate() {
             let mut cells = vec![way.to_owned()];
-            for (.., map) in &seen.maps[4 * row..4 * row + 4] {
+            for (_, map) in &seen.maps[4 * row..4 * row + 4] {
                 cells.push(rmse(map)?);
             }
             rows.push(cells);

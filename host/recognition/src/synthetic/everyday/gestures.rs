@@ -27,20 +27,14 @@ fn wave_ends(maker: &mut Maker) -> (Hand, Hand) {
 
 fn wave(maker: &mut Maker, hands: &[usize]) -> Motion {
     let (low, high) = wave_ends(maker);
-    let with = |mut moment: Moment, hand: Hand| {
-        for &side in hands {
-            moment.hands[side] = hand;
-        }
-        moment
-    };
-    let (a, b) = (with(maker.rest, low), with(maker.rest, high));
+    let (a, b) = (with(maker.rest, hands, low), with(maker.rest, hands, high));
     let (rise, swing) = (maker.seconds(0.7), maker.seconds(0.4));
     let times = maker.rng.random_range(1..6);
     // Most raise a stretched arm at the side, others bring the hand up before the body.
     let mut way_in = vec![(rise, a)];
     if maker.chance(0.6) {
         let side = Hand::sideways(maker.draw(-45.0, 35.0), maker.draw(0.75, 0.98), maker.draw(0.0, 0.35));
-        way_in = vec![(0.7 * rise, with(maker.rest, side)), (0.5 * rise, a)];
+        way_in = vec![(0.7 * rise, with(maker.rest, hands, side)), (0.5 * rise, a)];
     }
     maker.repeated(way_in, &[(swing, b), (swing, a)], times)
 }
@@ -149,7 +143,7 @@ pub fn throw(maker: &mut Maker) -> Motion {
     maker.gesture(parts)
 }
 
-fn both_or_one(maker: &mut Maker, both: f64) -> Vec<usize> {
+pub fn both_or_one(maker: &mut Maker, both: f64) -> Vec<usize> {
     if maker.chance(both) { vec![0, 1] } else { vec![maker.main] }
 }
 

@@ -1,5 +1,6 @@
 //! Motions of the whole body: bending, sitting, lying, kicking, jumping, digging.
 
+use super::gestures::both_or_one;
 use super::moment::{Hand, Moment};
 use super::motion::{Maker, Motion};
 use rand::Rng;
@@ -45,12 +46,8 @@ fn held(maker: &mut Maker, hands: &[usize]) -> Moment {
     moment
 }
 
-fn one_or_two(maker: &mut Maker) -> Vec<usize> {
-    if maker.chance(0.5) { vec![0, 1] } else { vec![maker.main] }
-}
-
 pub fn pick_up(maker: &mut Maker) -> Motion {
-    let hands = one_or_two(maker);
+    let hands = both_or_one(maker, 0.5);
     let deep = maker.draw(0.85, 1.2);
     let (before, after) = steps(maker);
     let low = down(maker, &hands, deep);
@@ -62,7 +59,7 @@ pub fn pick_up(maker: &mut Maker) -> Motion {
 }
 
 pub fn put_down(maker: &mut Maker) -> Motion {
-    let hands = one_or_two(maker);
+    let hands = both_or_one(maker, 0.5);
     let deep = maker.draw(0.85, 1.2);
     let (before, after) = steps(maker);
     let low = down(maker, &hands, deep);

@@ -2,7 +2,10 @@
 //! all bones along one axis, so that the rest pose folds head and feet to one side of the hips; then the frames give
 //! the up axis. Lengths along bones are valid in every pose.
 
-use super::super::recording::{Known, Source, Unit, Up};
+use super::super::{
+    posture,
+    recording::{Known, Source, Unit, Up},
+};
 use super::kinematics::{Kinematics, at_rest};
 use super::parse::{Joint, Motion};
 use crate::silhouette::capsule::Point3;
@@ -131,11 +134,7 @@ pub fn unit(joints: &[Joint]) -> Known<Unit> {
 /// Largest extent of the rest pose along an axis: a body with arms out is as wide as tall.
 fn extent(joints: &[Joint]) -> f64 {
     let places = at_rest(joints);
-    let along = |k: usize| {
-        let values = || places.iter().map(|place| place[k]);
-        values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
-    };
-    (0..3).map(along).fold(0.0, f64::max)
+    (0..3).map(|axis| posture::extent(&places, axis)).fold(0.0, f64::max)
 }
 
 pub fn up(motion: &Motion, kinematics: &Kinematics) -> Known<Up> {

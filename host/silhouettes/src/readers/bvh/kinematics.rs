@@ -3,7 +3,7 @@
 //! at its parent's position plus the parent's total rotation times its own translation. O(joints) per frame.
 
 use super::parse::{Channel, Joint, Motion};
-use crate::silhouette::capsule::Point3;
+use crate::silhouette::{capsule::Point3, view::product};
 
 type Matrix = [[f64; 3]; 3];
 
@@ -114,10 +114,6 @@ fn about(axis: usize, angle_deg: f64) -> Matrix {
     let mut matrix = STRAIGHT;
     (matrix[j][j], matrix[j][k], matrix[k][j], matrix[k][k]) = (cos, -sin, sin, cos);
     matrix
-}
-
-fn product(a: &Matrix, b: &Matrix) -> Matrix {
-    std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
 #[cfg(test)]

@@ -268,15 +268,9 @@ fn unordered(row: &StringRecord) -> RecordingError {
 #[cfg(test)]
 mod tests {
     use crate::readers::{
-        self,
-        csv::sample::{BODY, COCO},
-        recording::{Choices, Recording, RecordingError},
+        csv::sample::{BODY, COCO, read},
+        recording::Recording,
     };
-
-    fn read(header: &str, rows: &[String], person: Option<usize>) -> Result<Recording, RecordingError> {
-        let text = format!("{header}\n{}\n", rows.join("\n"));
-        readers::read(text.as_bytes(), "csv", Choices { person, ..Choices::default() })
-    }
 
     /// Rows of all points in two frames.
     fn rows(row: impl Fn(usize, usize, &str, [f64; 2]) -> String) -> Vec<String> {

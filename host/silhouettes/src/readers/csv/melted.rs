@@ -108,16 +108,7 @@ pub fn cast(rows: Vec<StringRecord>) -> Result<Vec<StringRecord>, RecordingError
 
 #[cfg(test)]
 mod tests {
-    use crate::readers::{
-        self,
-        csv::sample::BODY,
-        recording::{Choices, Recording, RecordingError},
-    };
-
-    fn read(header: &str, rows: &[String], person: Option<usize>) -> Result<Recording, RecordingError> {
-        let text = format!("{header}\n{}\n", rows.join("\n"));
-        readers::read(text.as_bytes(), "csv", Choices { person, ..Choices::default() })
-    }
+    use crate::readers::csv::sample::{BODY, read};
 
     /// A row for each frame, point and axis; all frames of a value before those of the next.
     fn rows(row: impl Fn(usize, &str, &str, f64) -> String) -> Vec<String> {

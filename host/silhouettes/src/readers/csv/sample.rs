@@ -1,5 +1,10 @@
 //! A person for tests of tables.
 
+use crate::readers::{
+    self,
+    recording::{Choices, Recording, RecordingError},
+};
+
 /// A person 170 pixels tall; the left wrist is further to the right in the picture, and the right arm raised.
 pub const BODY: [(&str, [f64; 2]); 13] = [
     ("nose", [100.0, 30.0]),
@@ -19,3 +24,8 @@ pub const BODY: [(&str, [f64; 2]); 13] = [
 
 /// Their numbers in COCO's order.
 pub const COCO: [usize; 13] = [0, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16];
+
+pub fn read(header: &str, rows: &[String], person: Option<usize>) -> Result<Recording, RecordingError> {
+    let text = format!("{header}\n{}\n", rows.join("\n"));
+    readers::read(text.as_bytes(), "csv", Choices { person, ..Choices::default() })
+}

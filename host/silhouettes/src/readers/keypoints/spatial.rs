@@ -5,7 +5,10 @@ use super::{
     people::distance,
     points::{Person, Raw},
 };
-use crate::{readers::recording::RecordingError, silhouette::capsule::Point3};
+use crate::{
+    readers::{posture::extent, recording::RecordingError},
+    silhouette::capsule::Point3,
+};
 
 /// Confidences exceed 1 slightly in some programs.
 const HIGHEST_CONFIDENCE: f64 = 1.2;
@@ -34,10 +37,7 @@ fn are_flat<'a>(people: impl Iterator<Item = &'a Person>) -> bool {
     const MOST: f64 = 0.05;
     let is_flat = |person: &Person| {
         let points: Vec<Point3> = person.raw.iter().filter_map(Raw::in_space).collect();
-        let reach = |k: usize| {
-            let values = || points.iter().map(|point| point[k]);
-            values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
-        };
+        let reach = |k: usize| extent(&points, k);
         (points.len() > 1).then(|| reach(2) <= MOST * reach(0).max(reach(1)))
     };
     let known: Vec<bool> = people.filter_map(is_flat).collect();

@@ -242,6 +242,16 @@ mod tests {
         BODY.iter().map(|(name, place)| format!(",{}", of(name, *place))).collect()
     }
 
+    /// Places of a layout's points; those that the body lacks are at the origin.
+    fn places(points: usize) -> Vec<[f64; 2]> {
+        let place = |name: Option<usize>| {
+            let name = NAMES[name?].replace(' ', "_");
+            BODY.iter().find(|(known, _)| *known == name).map(|(_, place)| *place)
+        };
+        let layout = Layout::of(points).expect("a layout");
+        layout.places().map(|name| place(name).unwrap_or_default()).collect()
+    }
+
     #[track_caller]
     fn expect_person(text: &str, frames: usize) -> Recording {
         let found = read(text, None).unwrap_or_else(|error| panic!("{error}: {text}"));
@@ -324,16 +334,7 @@ mod tests {
 
     #[test]
     fn the_place_of_a_box_next_to_numbered_points_is_no_point() {
-        let place = |name: Option<usize>| {
-            let name = NAMES[name?].replace(' ', "_");
-            BODY.iter().find(|(known, _)| *known == name).map(|(_, place)| *place)
-        };
-        let coco = Layout::of(17).expect("COCO");
-        let row: String = coco
-            .places()
-            .map(place)
-            .map(|place| place.unwrap_or_default())
-            .fold(String::new(), |row, [x, y]| format!("{row},{x},{y}"));
+        let row: String = places(17).iter().map(|[x, y]| format!(",{x},{y}")).collect();
         for suffix in ["", "_coord"] {
             let header: String = (1..=17).map(|n| format!(",x{n}{suffix},y{n}{suffix}")).collect();
             let text = format!("frame,bbox_x,bbox_y,bbox_w{header}\n0,1,2,3{row}\n");
@@ -411,17 +412,8 @@ mod tests {
 
     #[test]
     fn tables_of_numbered_points_are_read_in_the_order_of_a_layout() {
-        let place = |name: Option<usize>| {
-            let name = NAMES[name?].replace(' ', "_");
-            BODY.iter().find(|(known, _)| *known == name).map(|(_, place)| *place)
-        };
-        let places: Vec<[f64; 2]> = Layout::of(33)
-            .expect("MediaPipe's")
-            .places()
-            .map(|name| place(name).unwrap_or_default())
-            .collect();
-        let row = places.iter().map(|[x, y]| format!(",{},{},-0.3,0.9", x / 320.0, y / 200.0));
-        let row: String = row.collect();
+        let row = |[x, y]: &[f64; 2]| format!(",{},{},-0.3,0.9", x / 320.0, y / 200.0);
+        let row: String = places(33).iter().map(row).collect();
         let columns: [fn(usize, &str) -> String; 4] = [
             |n, field| format!("{}{}", &field[..1], n + 1),
             |n, field| format!("{}_{n}", &field[..1]),

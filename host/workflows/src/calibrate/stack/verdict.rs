@@ -84,9 +84,9 @@ fn inaccurate(found: &StackLens) -> Option<String> {
     let held_out = &found.held_out;
     if held_out.fill < FILLED {
         return Some(format!(
-            "only {:.0} % of the target has a depth: check, in this order, for parts of the target without fine texture, too little \
-             light, too coarse a step, a lamp that changes over the stack, an image whose size changes by some percent, a lens with an \
-             obscured centre (mirror lens)",
+            "only {:.0} % of the target has a depth: check, in this order, for saturated (white) parts of the target, parts without fine \
+             texture, too little light, too coarse a step, a lamp that changes over the stack, an image whose size changes by some \
+             percent, a lens with an obscured centre (mirror lens)",
             100.0 * held_out.fill
         ));
     }
@@ -95,7 +95,7 @@ fn inaccurate(found: &StackLens) -> Option<String> {
     if error > ROUGH {
         return Some(format!(
             "the error is {:.0} % of the range of a pair: look for slices that are missing, moved or out of order, and check that the \
-             stage's steps are even and the target is flat",
+             stage's steps are even, the target is flat and the lens has little field curvature",
             100.0 * error
         ));
     }
@@ -178,7 +178,7 @@ mod tests {
         let unmeasured = of([26.72, 0.0], 0.85);
         assert!(unmeasured.contains("26.720 px") && unmeasured.contains("not measured"), "{unmeasured}");
         let alike = of([0.76, 0.71], 0.85);
-        let words = ["85 %", "texture", "lamp", "mirror lens"];
+        let words = ["85 %", "saturated", "texture", "lamp", "mirror lens"];
         assert!(words.iter().all(|word| alike.contains(word)), "{alike}");
         // A real lens has these, and depth within 0.014 of its range.
         assert_eq!(of([1.153, 0.975], 1.0), "good");
