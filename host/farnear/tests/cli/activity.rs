@@ -275,7 +275,7 @@ fn damaged_models_and_samples_are_named_and_nothing_is_written() {
     let masks = people.masks("p01-dig", 1);
     let shapes = shapes.display().to_string();
     for (view, model, phrases) in [
-        (&masks, &format, vec!["format.fnm", "format version 14", "train it again"]),
+        (&masks, &format, vec!["format.fnm", "format version 15", "train it again"]),
         (&masks, &descriptor, vec!["descriptor.fnm", "descriptor version 9", "train it again"]),
         (&masks, &body, vec!["body.fnm", "damaged", "checksum"]),
         (&masks, &cut, vec!["cut.fnm", "cut short"]),
