@@ -209,7 +209,8 @@ fn honest_host(bench: &mut Bench, ledger: &mut Ledger, enemy: &mut Enemy) {
     let (key, value) = (SettingKey::LensSpeedNmPerS, ledger.speed);
     let read = ask(bench, ledger, enemy, &Request::ReadSetting { key });
     assert!(matches!(&read, Response::Setting(setting) if setting.value == value), "{value}: {read:?}");
-    let target = Nanometres(20_000 + enemy.below(100_000) as i32);
+    // Far from the lens, because the attack may have left both stages close to each other.
+    let target = Nanometres(150_000 + enemy.below(40_000) as i32);
     let silence = Micros(60_000_000);
     let (id, accepted) =
         say(bench, ledger, enemy, &Request::Move { axis: Axis::SensorFine, target, silence });
