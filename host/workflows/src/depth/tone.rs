@@ -66,10 +66,15 @@ fn exponent(far: &Array2<f32>, near: &Array2<f32>) -> Option<(f64, f64)> {
         (0..SIDE_PX).map(|at| (PI * (at as f64 + 0.5) / side).sin().powi(2) * 2.0 / side).collect();
     let moments = |image: &Array2<f32>, top: usize, left: usize| {
         let mut sums = [0.0; 2];
-        for ((y, x), value) in image.slice(s![top..top + SIDE_PX, left..left + SIDE_PX]).indexed_iter() {
-            let (weight, value) = (weights[y] * weights[x], f64::from(*value));
-            sums[0] += weight * value;
-            sums[1] += weight * value * value;
+        let window = image.slice(s![top..top + SIDE_PX, left..left + SIDE_PX]);
+        for (row, of_row) in window.rows().into_iter().zip(&weights) {
+            let mut across = [0.0; 2];
+            for (value, weight) in row.iter().zip(&weights) {
+                let value = f64::from(*value);
+                across[0] += weight * value;
+                across[1] += weight * value * value;
+            }
+            sums = [sums[0] + of_row * across[0], sums[1] + of_row * across[1]];
         }
         [sums[0], sums[1] - sums[0] * sums[0]]
     };
