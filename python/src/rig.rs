@@ -292,7 +292,7 @@ fn levels(percent: Option<[f64; 2]>) -> PyResult<Option<LightLevels>> {
 }
 
 fn open(address: &CameraAddress) -> Result<Box<dyn farnear_capture::camera::Camera>, Failed> {
-    let camera = address.open()?.ok_or_else(|| Failed("there is no camera".into()))?;
+    let camera = address.open()?.ok_or_else(|| Failed("no camera was named".into()))?;
     Ok(camera)
 }
 

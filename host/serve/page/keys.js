@@ -18,20 +18,15 @@ function refuse(event) {
   if (!(target instanceof HTMLInputElement && target.type === "number" && data && DROPPED.test(data))) return;
   event.preventDefault();
   target.setAttribute("aria-invalid", "true");
-  target.dataset.length = String(target.value.length);
   target.dataset.typed = target.value;
   notice(`${data}: expected a number with a decimal point, and a hyphen as the minus`, "warning");
 }
 
 function accept({ target }) {
-  if (!(target instanceof HTMLInputElement && target.dataset.length)) return;
-  const { length } = target.value;
-  if (length > Number(target.dataset.length)) {
-    target.dataset.length = String(length);
-    target.dataset.typed = target.value;
-  } else {
+  if (!(target instanceof HTMLInputElement && target.dataset.typed !== undefined)) return;
+  if (target.value.length > target.dataset.typed.length) target.dataset.typed = target.value;
+  else {
     target.removeAttribute("aria-invalid");
-    delete target.dataset.length;
     delete target.dataset.typed;
   }
 }

@@ -135,19 +135,23 @@ impl Guard {
 
     pub fn check_token(&self, headers: &HeaderMap) -> Result<(), Refused> {
         let Some(token) = &self.token else { return Ok(()) };
-        let text = |name| headers.get_all(name).iter().filter_map(|value| value.to_str().ok());
-        let bearer = text(header::AUTHORIZATION).filter_map(|value| value.strip_prefix("Bearer "));
-        let cookies = text(header::COOKIE).flat_map(|value| value.split(';'));
-        let cookie = cookies.filter_map(|pair| Some(pair.trim().strip_prefix(COOKIE)?.split_once('=')?.1));
-        if bearer.chain(cookie).any(|given| token.is(given)) { Ok(()) } else { Err(Refused::Token) }
+        let bearer = texts(headers, header::AUTHORIZATION).filter_map(|value| value.strip_prefix("Bearer "));
+        if bearer.chain(self.cookies(headers)).any(|given| token.is(given)) {
+            Ok(())
+        } else {
+            Err(Refused::Token)
+        }
     }
 
     pub fn has_token(&self, headers: &HeaderMap) -> bool {
-        let own = format!("{COOKIE}-{}", self.port);
-        let is_ours =
-            |pair: &str| pair.trim().split_once('=').is_some_and(|(name, _)| name == COOKIE || name == own);
-        let cookie = headers.get_all(header::COOKIE).iter().filter_map(|value| value.to_str().ok());
-        headers.contains_key(header::AUTHORIZATION) || cookie.flat_map(|value| value.split(';')).any(is_ours)
+        headers.contains_key(header::AUTHORIZATION) || self.cookies(headers).next().is_some()
+    }
+
+    /// Values of this port's cookies.
+    fn cookies<'a>(&self, headers: &'a HeaderMap) -> impl Iterator<Item = &'a str> {
+        let name = format!("{COOKIE}-{}=", self.port);
+        let pairs = texts(headers, header::COOKIE).flat_map(|value| value.split(';'));
+        pairs.filter_map(move |pair| pair.trim().strip_prefix(&*name))
     }
 
     /// The cookie for a correct token.
@@ -209,6 +213,10 @@ impl Drop for Waiting<'_> {
     fn drop(&mut self) {
         lock(&self.throttle.0).remove(&self.address);
     }
+}
+
+fn texts(headers: &HeaderMap, name: header::HeaderName) -> impl Iterator<Item = &str> {
+    headers.get_all(name).iter().filter_map(|value| value.to_str().ok())
 }
 
 #[cfg(test)]
@@ -280,11 +288,11 @@ mod tests {
         let guard = network();
         let asked = |name, value: &str| guard.check_token(&headers(&[(name, value)]));
         assert_eq!(asked("authorization", &format!("Bearer {SECRET}")), Ok(()));
-        assert_eq!(asked("cookie", &format!("a=b; farnear-token={SECRET}")), Ok(()));
+        assert_eq!(asked("cookie", &format!("a=b; farnear-token-8080={SECRET}")), Ok(()));
         for (name, value) in [
             ("authorization", SECRET),
-            ("cookie", "farnear-token="),
-            ("cookie", "farnear-token=0123"),
+            ("cookie", "farnear-token-8080="),
+            ("cookie", "farnear-token-8080=0123"),
             ("accept", SECRET),
         ] {
             assert_eq!(asked(name, value), Err(Refused::Token), "{name}: {value}");
@@ -299,10 +307,10 @@ mod tests {
         let guard = network();
         let own = guard.cookie(SECRET).unwrap();
         assert!(own.starts_with(&format!("farnear-token-8080={SECRET};")), "{own}");
-        for cookies in ["farnear-token-8081=other; farnear-token-8080=", "farnear-token-8081="] {
-            let sent = headers(&[("cookie", &format!("{cookies}{SECRET}"))]);
-            assert_eq!(guard.check_token(&sent), Ok(()), "{cookies}");
-        }
+        let sent = headers(&[("cookie", &format!("farnear-token-8081=other; farnear-token-8080={SECRET}"))]);
+        assert_eq!(guard.check_token(&sent), Ok(()));
+        let sent = headers(&[("cookie", &format!("farnear-token-8081={SECRET}"))]);
+        assert_eq!(guard.check_token(&sent), Err(Refused::Token));
     }
 
     #[test]
@@ -333,7 +341,7 @@ mod tests {
     fn a_token_that_is_sent_is_noticed_whether_or_not_it_is_right() {
         for (name, value, sent) in [
             ("authorization", "Bearer 0123", true),
-            ("cookie", "a=b; farnear-token=0123", true),
+            ("cookie", "a=b; farnear-token-8080=0123", true),
             ("cookie", "farnear-token-1=0123", false),
             ("cookie", "a=b; c=d", false),
             ("accept", "farnear-token=0123", false),

@@ -25,9 +25,9 @@ const FLOOR: f32 = 0.0026;
 /// Part of the windows' disagreement beyond noise by which the larger one's variance grows. Chosen on rendered spheres, cones
 /// and slants for an error over deviation of 0.9 to 1.25.
 const DOUBT: f32 = 0.5;
-/// The same for a learned lens, whose windows are larger: a window of 41 px is off by 1.08 of its difference from one of 11 px
-/// where the surface curves evenly, and by as much as it differs from its own mean over the window. The model's error may hide
-/// the former.
+/// `doubt` and `curvature` of [`Contrast`] for a learned lens, whose windows are larger. Where the surface curves evenly, a window
+/// of 41 px is off by 1.08 of its difference from one of 11 px, which the model's error may hide, and by its difference from its
+/// own mean over the window.
 const LEARNED: [f32; 2] = [1.0, 1.0];
 /// Standard deviation of alpha from which a window tells nothing about the surface.
 const UNINFORMATIVE: f32 = 0.045;

@@ -158,6 +158,11 @@ mod tests {
             );
             assert_eq!(chosen, [0.11, 0.30, 0.2]);
             assert!((of_chosen[1] - 9e-3).abs() < 1e-6 && of_chosen[0] == 1e-4 && of_chosen[2] == 1e-4);
+            // A crest, 0.05 from the mean over the window.
+            let crest = [&difference[..1], &[1.0], &[0.06]];
+            let [small, large] = [small, large].map(|rows| rows.map(|row| &row[..1]));
+            decide_row(backend, of, crest, small, large, [&mut chosen[..1], &mut of_chosen[..1]]);
+            assert!(chosen[0] == 0.11 && (of_chosen[0] - 2.5e-3).abs() < 1e-6, "{of_chosen:?}");
         }
     }
 }

@@ -451,7 +451,7 @@ fn wrong_tokens_are_answered_slowly_and_a_right_cookie_or_bearer_is_not_delayed(
     assert!(refused.iter().all(|status| [401, 429].contains(status)), "{refused:?}");
     let took = began.elapsed();
     assert!(answered as f64 <= 2.0 + took.as_secs_f64(), "{answered} of 60 guesses in {took:?}");
-    let (cookie, bearer) = (format!("farnear-token={TOKEN}"), format!("Bearer {TOKEN}"));
+    let (cookie, bearer) = (served.cookie(TOKEN), format!("Bearer {TOKEN}"));
     let login = format!(r#"{{"token":"{TOKEN}"}}"#);
     // A guess waits for a second: on a busy computer the first login may come too late.
     let refused = (0..20).any(|_| {

@@ -56,6 +56,12 @@ impl Served {
         Self::start(Some(RigAddress::Port(port)), Some(Box::new(board)), |_| Listen::Loopback { port: 0 })
     }
 
+    /// The cookie with a token, as a browser sends it.
+    pub fn cookie(&self, token: &str) -> String {
+        let (_, port) = self.address.rsplit_once(':').unwrap();
+        format!("farnear-token-{port}={token}")
+    }
+
     pub fn captures_only() -> Self {
         Self::start(None, None, |_| Listen::Loopback { port: 0 })
     }

@@ -150,7 +150,7 @@ fn anybody_may_stop_and_it_does_not_wait_for_the_job() {
 fn ten_browsers_of_a_lab_see_the_job_that_one_of_them_runs() {
     let (port, board) = plug_in(Faults { never_ends: true, ..Faults::default() });
     let served = Served::start(Some(RigAddress::Port(port)), Some(Box::new(board)), network);
-    let cookie = format!("farnear-token={TOKEN}");
+    let cookie = served.cookie(TOKEN);
     let get = |path: &str| served.ask("GET", path, &[("cookie", &cookie)], "");
     while get("/api/state").json()["rig"]["phase"] != "ready" {
         std::thread::sleep(std::time::Duration::from_millis(20));

@@ -90,7 +90,7 @@ fn slow_headers_half_bodies_and_idle_connections_are_closed() {
 #[test]
 fn eleven_hundred_idle_connections_leave_the_owner_at_work() {
     let served = Served::start(None, None, network);
-    let cookie = format!("farnear-token={TOKEN}");
+    let cookie = served.cookie(TOKEN);
     let owner = [("cookie", cookie.as_str())];
     let before = memory_mb();
     let mut idle = Vec::new();

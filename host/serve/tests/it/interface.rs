@@ -224,8 +224,7 @@ fn the_network_needs_the_token() {
     let wrong = json!({ "token": "0123456789abcdee" }).to_string();
     assert_eq!(served.post("/login", "", &wrong).status, 401);
     let let_in = served.post("/login", "", &json!({ "token": TOKEN }).to_string());
-    let port = served.address.rsplit_once(':').unwrap().1;
-    let cookie = format!("farnear-token-{port}={TOKEN}");
+    let cookie = served.cookie(TOKEN);
     assert!(let_in.headers.contains(&format!("set-cookie: {cookie}; HttpOnly")), "{let_in:?}");
     assert_eq!(served.ask("GET", "/api/state", &[("cookie", cookie.as_str())], "").status, 200);
     let bearer = format!("Bearer {TOKEN}");
