@@ -183,7 +183,7 @@ fn estimate_into(
     let backend = settings.backend.unwrap_or_else(Backend::best);
     let scales = Scales::new(far, near, settings.noise);
     let mut maps = [(); 2].map(|()| Array2::<f32>::zeros(size));
-    let rows = rows::rows(size);
+    let rows = rows_of_band(size.0);
     let [deviation, misfit] = &mut maps;
     let of_depth: Vec<Option<ArrayViewMut2<'_, f32>>> = match &mut depth_mm {
         Some(depth_mm) => depth_mm.axis_chunks_iter_mut(Axis(0), rows).map(Some).collect(),
@@ -233,4 +233,11 @@ pub(crate) fn check_pair(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Result<
         }
     }
     Ok(())
+}
+
+/// Rows of a band of an image of `height`: its halo of about 20 rows on either side is computed twice.
+fn rows_of_band(height: usize) -> usize {
+    const MOST: usize = 256;
+    let threads = rayon::current_num_threads().max(1);
+    height.div_ceil(height.div_ceil(MOST).next_multiple_of(threads)).max(32)
 }

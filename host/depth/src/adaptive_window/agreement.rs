@@ -36,7 +36,8 @@ impl Agreement {
             large: [plane(), plane()],
             compared: [plane(), plane(), plane()],
             sums: Plane::new(6, wide),
-            work: vec![0.0; 2 * wide],
+            // Decided rows are extended to whole vectors.
+            work: vec![0.0; 2 * (wide + simd::TOGETHER)],
         }
     }
 
@@ -78,7 +79,8 @@ impl Agreement {
     /// Alpha and its variance of the row `half` before the last one, without the outer `half` columns.
     pub fn decide(&mut self, backend: Backend, row: usize, wide: usize, to: [&mut [f32]; 2]) {
         let at = (row - self.half) % self.ring;
-        let width = wide - 2 * self.half;
+        let width = (wide - 2 * self.half).next_multiple_of(simd::TOGETHER).min(to[0].len());
+        let wide = width + 2 * self.half;
         let stride = self.sums.stride();
         let (of_rows, of_windows) = self.sums.all_mut().split_at_mut(3 * stride);
         for index in 0..3 {
@@ -95,6 +97,6 @@ impl Agreement {
         let [small, large] = [&self.small, &self.large]
             .map(|planes| planes.each_ref().map(|plane| &plane.row(at)[first..last]));
         let sums = [0, 1, 2].map(|index| &of_windows[index * stride..][..width]);
-        simd::decide_row(backend, self.of, sums, small, large, to);
+        simd::decide_row(backend, self.of, sums, small, large, to.map(|row| &mut row[..width]));
     }
 }

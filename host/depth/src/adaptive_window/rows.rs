@@ -13,8 +13,6 @@ use crate::depth_of_alpha::DepthOfAlpha;
 use crate::operators::linearise;
 use crate::simd::{self, Contrast, CubicSums, Deviation, Found, MAX_ROWS, OfNoise, Plane, Residual};
 
-/// Rows of a band: its halo of about 20 rows on either side is computed twice.
-const ROWS: usize = 256;
 /// Columns of a tile: as many as the cache holds.
 const COLUMNS: usize = 640;
 const MISFIT_PX: [usize; 2] = [7, 21];
@@ -38,13 +36,15 @@ const MEDIAN_GAIN: [f32; 4] = [1.0, 0.94, 0.85, 0.74];
 const RECOMPUTED: isize = 16;
 const WAITING: usize = 8;
 
-pub(super) fn rows((height, _): (usize, usize)) -> usize {
-    let threads = rayon::current_num_threads().max(1);
-    height.div_ceil(height.div_ceil(ROWS).next_multiple_of(threads)).max(32)
-}
-
 fn columns(width: usize) -> usize {
     width.div_ceil(width.div_ceil(COLUMNS))
+}
+
+/// Columns of windows, of their products and of the filters' input. Surplus columns on the right make whole vectors.
+fn widths(columns: usize, outer: usize, radius: usize, reach: usize) -> [usize; 3] {
+    let wide = (columns + 2 * outer).next_multiple_of(simd::TOGETHER);
+    let products = (wide + 2 * radius).next_multiple_of(simd::TOGETHER);
+    [wide, products, products + 2 * reach]
 }
 
 pub(super) struct Tile<'a> {
@@ -116,8 +116,7 @@ impl<'a> Tile<'a> {
         let reach = job.bank.reach_px();
         // Window, the row that leaves it, the pixels in the middle of its filters, and a block of new rows.
         let ring = (2 * radius + 2 + reach + MAX_ROWS).next_multiple_of(MAX_ROWS);
-        let wide = columns(job.far.ncols()) + 2 * outer[1];
-        let (products, input) = (wide + 2 * radius, wide + 2 * radius + 2 * reach);
+        let [wide, products, input] = widths(columns(job.far.ncols()), outer[1], radius, reach);
         let variance_gain = job.bank.variance_gain();
         let [offset, slope] = job.optics.defocus_line_mm();
         let of_residual = Residual {
@@ -197,9 +196,8 @@ impl<'a> Tile<'a> {
         let [above, _] = self.around;
         let reach = self.job.bank.reach_px();
         let halo = self.outer.map(|around| around + self.radius + reach);
-        let wide = place.columns + 2 * self.outer[1];
-        let products = wide + 2 * self.radius;
-        let [inputs, input] = [place.rows + 2 * halo[0], place.columns + 2 * halo[1]];
+        let [wide, products, input] = widths(place.columns, self.outer[1], self.radius, reach);
+        let inputs = place.rows + 2 * halo[0];
         let Job { far, near, bank, scales, .. } = self.job;
         let around = [bank.reach_px(), self.sides[0]];
         let holes = if scales.whole { None } else { Holes::of([*far, *near], place, halo, around) };
@@ -310,8 +308,7 @@ impl<'a> Tile<'a> {
         let to = alpha.row_mut(row % WAITING);
         match agreement {
             Some(agreement) => {
-                let inner = wide - 2 * agreement.half;
-                let to = [&mut to[..inner], &mut found.taken[..inner]];
+                let to = [&mut to[..wide], &mut found.taken[..wide]];
                 agreement.decide(job.backend, row + 2 * agreement.half, wide, to);
             }
             None => {
@@ -370,7 +367,8 @@ impl<'a> Tile<'a> {
         let Columns { side, sums } = &self.columns[index];
         let (side, backend, scales) = (*side, job.backend, job.scales);
         let from = *radius - side / 2;
-        let of = |k: usize| &sums.row(k)[from..from + wide + side - 1];
+        let products = row.work.len() / 2;
+        let of = |k: usize| &sums.row(k)[from..products];
         for k in 0..=ENERGY {
             simd::row_sums(backend, of(k), side, &mut row.work, &mut row.sums[k][..wide]);
         }

@@ -113,12 +113,20 @@ pub(super) fn compare(pair: &Thinned, size: (usize, usize), noise: &PairNoise) -
 /// Whether the bands of both images, whose noise has this variance, differ by noise alone.
 fn equally_sharp([a, b]: [&Array2<f32>; 2], variance: f64) -> bool {
     let (mut detail, mut difference, mut pixels) = (0.0, 0.0, 0.0);
-    for (a, b) in a.iter().zip(b).filter(|(a, b)| a.is_finite() && b.is_finite()) {
-        detail += f64::from(a * b);
-        difference += f64::from((a - b) * (a - b));
-        pixels += 1.0;
+    let all_pixels = a.len() as f64;
+    let limit = |pixels: f64| DIFFERENCE * 2.0 * variance * pixels;
+    for (a, b) in a.rows().into_iter().zip(b.rows()) {
+        for (a, b) in a.iter().zip(b).filter(|(a, b)| a.is_finite() && b.is_finite()) {
+            detail += f64::from(a * b);
+            difference += f64::from((a - b) * (a - b));
+            pixels += 1.0;
+        }
+        // Most pairs differ clearly within a few rows.
+        if difference > limit(all_pixels) {
+            return false;
+        }
     }
-    difference < DIFFERENCE * 2.0 * variance * pixels && detail > CLEAR * variance * pixels
+    difference < limit(pixels) && detail > CLEAR * variance * pixels
 }
 
 /// Correlation of coarse detail around each pixel of the small images.

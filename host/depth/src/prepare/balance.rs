@@ -77,10 +77,11 @@ impl Gain {
         // Brighter blocks are more certain: noise and light from across the border weigh less.
         let weights: Vec<f64> = blocks.iter().map(|block| block.far * block.near).collect();
         let ratios: Vec<f64> = blocks.iter().map(|block| block.near / block.far).collect();
-        let flat = Fit::new(std::slice::from_ref(&ratios), &weights, |_| vec![1.0], &blocks)?;
-        let terms = |at: [f64; 2]| exponents().map(|(i, j)| at[0].powi(i) * at[1].powi(j)).collect();
+        let flat = Fit::new(std::slice::from_ref(&ratios), &weights, &[vec![1.0; blocks.len()]])?;
+        let term = |(i, j)| blocks.iter().map(|block| block.at[0].powi(i) * block.at[1].powi(j)).collect();
+        let terms: Vec<Vec<f64>> = exponents().map(term).collect();
         let reciprocals: Vec<f64> = ratios.iter().map(|ratio| ratio.recip()).collect();
-        let curved = Fit::new(&[ratios, reciprocals], &weights, terms, &blocks)?;
+        let curved = Fit::new(&[ratios, reciprocals], &weights, &terms)?;
         let polynomial = Polynomial { reciprocal: curved.which == 1, coefficients: curved.coefficients };
         let mean = flat.coefficients[0];
         let values = corners_and_middle(far.dim()).map(|at| polynomial.at(at));
@@ -157,15 +158,10 @@ struct Fit {
 }
 
 impl Fit {
-    fn new(
-        targets: &[Vec<f64>],
-        weights: &[f64],
-        terms: impl Fn([f64; 2]) -> Vec<f64>,
-        blocks: &[Block],
-    ) -> Option<Self> {
-        let rows: Vec<Vec<f64>> = blocks.iter().map(|block| terms(block.at)).collect();
+    /// `terms` and `targets` have a value for each of the blocks that `weights` are of.
+    fn new(targets: &[Vec<f64>], weights: &[f64], terms: &[Vec<f64>]) -> Option<Self> {
         let fits = targets.iter().enumerate().filter_map(|(which, target)| {
-            let (coefficients, rms) = robust(&rows, target, weights)?;
+            let (coefficients, rms) = robust(terms, target, weights)?;
             let mean = target.iter().sum::<f64>() / target.len() as f64;
             Some((rms / mean, Self { which, coefficients, rms }))
         });
@@ -174,17 +170,16 @@ impl Fit {
 }
 
 /// Coefficients and robust RMS residual (1.48 times the median magnitude).
-fn robust(rows: &[Vec<f64>], target: &[f64], weights: &[f64]) -> Option<(Vec<f64>, f64)> {
-    let mut trust = vec![1.0; rows.len()];
+fn robust(terms: &[Vec<f64>], target: &[f64], weights: &[f64]) -> Option<(Vec<f64>, f64)> {
+    let mut trust = vec![1.0; target.len()];
     let mut found = (Vec::new(), f64::INFINITY);
     for _ in 0..ROUNDS {
         let weights: Vec<f64> = weights.iter().zip(&trust).map(|(w, t)| w * t).collect();
-        let coefficients = weighted(rows, target, &weights)?;
-        let left: Vec<f64> = rows
-            .iter()
-            .zip(target)
-            .map(|(row, t)| t - row.iter().zip(coefficients.iter()).map(|(a, b)| a * b).sum::<f64>())
-            .collect();
+        let coefficients = weighted(terms, target, &weights)?;
+        let mut left = target.to_vec();
+        for (term, coefficient) in terms.iter().zip(&coefficients) {
+            left.iter_mut().zip(term).for_each(|(left, value)| *left -= coefficient * value);
+        }
         let rms = deviation(left.iter().copied())?.max(1e-12);
         // Huber's weights.
         trust = left.iter().map(|l| (1.5 * rms / l.abs().max(1e-300)).min(1.0)).collect();
@@ -194,17 +189,16 @@ fn robust(rows: &[Vec<f64>], target: &[f64], weights: &[f64]) -> Option<(Vec<f64
 }
 
 /// Least squares by the normal equations, which the field's few terms allow; by QR where they are nearly dependent.
-fn weighted(rows: &[Vec<f64>], target: &[f64], weights: &[f64]) -> Option<DVector<f64>> {
+fn weighted(terms: &[Vec<f64>], target: &[f64], weights: &[f64]) -> Option<DVector<f64>> {
     const LEAST_PIVOT: f64 = 1e-5;
-    let n = rows[0].len();
+    let n = terms.len();
     let (mut normal, mut right) = (DMatrix::<f64>::zeros(n, n), DVector::<f64>::zeros(n));
-    for ((row, target), weight) in rows.iter().zip(target).zip(weights) {
-        for (i, value) in row.iter().enumerate() {
-            let weighed = weight * value;
-            right[i] += weighed * target;
-            // The lower half, column by column.
-            let column = &mut normal.as_mut_slice()[i * n..][i..n];
-            column.iter_mut().zip(&row[i..]).for_each(|(sum, value)| *sum += weighed * value);
+    for (i, term) in terms.iter().enumerate() {
+        let weighed: Vec<f64> = weights.iter().zip(term).map(|(weight, value)| weight * value).collect();
+        right[i] = dot(&weighed, target);
+        // Cholesky's decomposition reads the lower half.
+        for (j, term) in terms.iter().enumerate().skip(i) {
+            normal[(j, i)] = dot(&weighed, term);
         }
     }
     let certain = |factor: &nalgebra::Cholesky<f64, nalgebra::Dyn>| {
@@ -215,8 +209,18 @@ fn weighted(rows: &[Vec<f64>], target: &[f64], weights: &[f64]) -> Option<DVecto
         return Some(factor.solve(&right));
     }
     let roots: Vec<f64> = weights.iter().map(|weight| weight.sqrt()).collect();
-    let matrix = DMatrix::from_fn(rows.len(), n, |i, j| roots[i] * rows[i][j]);
-    least_squares::solve(matrix, DVector::from_fn(rows.len(), |i, _| roots[i] * target[i])).ok()
+    let matrix = DMatrix::from_fn(target.len(), n, |i, j| roots[i] * terms[j][i]);
+    least_squares::solve(matrix, DVector::from_fn(target.len(), |i, _| roots[i] * target[i])).ok()
+}
+
+/// Dot product in eight parallel sums, which the compiler vectorises.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
+    let mut sums = [0.0_f64; 8];
+    for (a, b) in a.iter().zip(b) {
+        sums.iter_mut().zip(a).zip(b).for_each(|((sum, a), b)| *sum += a * b);
+    }
+    sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
 }
 
 /// Sum of a row of a block in eight parallel sums, which the compiler vectorises.

@@ -103,12 +103,15 @@ fn decide_generic<L: Lanes>(
     let [alpha, variance] = to;
     let width = alpha.len();
     let variance = &mut variance[..width];
-    let [differences, counts, larger] = sums.map(|row| &row[..width]);
-    let [[small, of_small], [large, of_large]] = [small, large].map(|rows| rows.map(|row| &row[..width]));
+    // By closures the compiler would lose the lengths, and with them the vectors.
+    let (differences, counts, larger) = (&sums[0][..width], &sums[1][..width], &sums[2][..width]);
+    let (small, of_small) = (&small[0][..width], &small[1][..width]);
+    let (large, of_large) = (&large[0][..width], &large[1][..width]);
     for x in 0..width {
         let count = counts[x].max(1.0);
         let mean = differences[x] / count;
-        let curved = if counts[x] > 0.0 { large[x] - larger[x] / count } else { 0.0 };
+        let mean_larger = larger[x] / count;
+        let curved = if counts[x] > 0.0 { large[x] - mean_larger } else { 0.0 };
         let flat = mean <= NOT_FLAT;
         let factor = polynomial(of.gain, large[x] * large[x]);
         // The smaller one's variance lacks the rest of the tolerance, which the differences are relative to.
@@ -117,8 +120,9 @@ fn decide_generic<L: Lanes>(
         let apart = (of_small[x].min(f32::MAX) * (mean - FLAT) + mean * tolerated).max(0.0);
         let curved = (curved * curved / factor - of_large[x]).max(0.0);
         let widened = of_large[x] + of.doubt * apart + of.curvature * curved;
+        let grown = of_small[x] * mean.min(LARGEST_GROWTH);
         alpha[x] = if flat { large[x] } else { small[x] };
-        variance[x] = if flat { widened } else { of_small[x] * mean.min(LARGEST_GROWTH) };
+        variance[x] = if flat { widened } else { grown };
     }
 }
 

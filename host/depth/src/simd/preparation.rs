@@ -3,7 +3,7 @@
 
 use super::dispatch;
 use super::lanes::Lanes;
-use super::windows::add_products_generic;
+use super::windows::{TOGETHER, add_products_generic};
 
 dispatch! {
     /// Adds the first row to `sums` and takes the second one off; `to` is their `share`.
@@ -99,34 +99,61 @@ dispatch! {
 #[inline(always)]
 fn compare_generic<L: Lanes>(
     noise: f32,
-    [least_detail, least_correlation]: [f32; 2],
+    limits: [f32; 2],
     [product, of_far, of_near]: [&[f32]; 3],
     different: &mut [bool],
 ) -> [f32; 3] {
-    const TOGETHER: usize = 16;
     let width = different.len();
     let (product, of_far, of_near) = (&product[..width], &of_far[..width], &of_near[..width]);
     let mut sums = [[0.0_f32; TOGETHER]; 3];
-    let mut begin = 0;
-    // Whole vectors; then single pixels, which the first sums take.
-    while begin < width {
-        let count = if begin + TOGETHER <= width { TOGETHER } else { 1 };
-        for i in 0..count {
-            let x = begin + i;
-            let (a, b) = (of_far[x], of_near[x]);
-            let detail_far = 1.0 - noise / a.max(f32::MIN_POSITIVE);
-            let detail_near = 1.0 - noise / b.max(f32::MIN_POSITIVE);
-            let counts = (detail_far > least_detail) & (detail_near > least_detail);
-            let largest = (detail_far * detail_near).sqrt();
-            let correlation = product[x] / (a * b).sqrt();
-            different[x] = counts & (correlation < least_correlation * largest);
-            sums[0][i] += if counts { correlation } else { 0.0 };
-            sums[1][i] += if counts { largest } else { 0.0 };
-            sums[2][i] += if counts { 1.0 } else { 0.0 };
+    let whole = width - width % TOGETHER;
+    for x in (0..whole).step_by(TOGETHER) {
+        let mut differs = [false; TOGETHER];
+        let [product, of_far, of_near] = [product, of_far, of_near].map(|row| &row[x..x + TOGETHER]);
+        for i in 0..TOGETHER {
+            let found = compare_pixel(noise, limits, [product[i], of_far[i], of_near[i]]);
+            differs[i] = found.differs;
+            sums[0][i] += found.correlation;
+            sums[1][i] += found.largest;
+            sums[2][i] += found.counted;
         }
-        begin += count;
+        different[x..x + TOGETHER].copy_from_slice(&differs);
+    }
+    for x in whole..width {
+        let found = compare_pixel(noise, limits, [product[x], of_far[x], of_near[x]]);
+        different[x] = found.differs;
+        sums[0][0] += found.correlation;
+        sums[1][0] += found.largest;
+        sums[2][0] += found.counted;
     }
     sums.map(|sums| sums.iter().sum())
+}
+
+/// Zeros where the pixel lacks detail.
+struct Compared {
+    differs: bool,
+    correlation: f32,
+    largest: f32,
+    counted: f32,
+}
+
+#[inline(always)]
+fn compare_pixel(
+    noise: f32,
+    [least_detail, least_correlation]: [f32; 2],
+    [product, of_far, of_near]: [f32; 3],
+) -> Compared {
+    let detail_far = 1.0 - noise / of_far.max(f32::MIN_POSITIVE);
+    let detail_near = 1.0 - noise / of_near.max(f32::MIN_POSITIVE);
+    let counts = (detail_far > least_detail) & (detail_near > least_detail);
+    let largest = (detail_far * detail_near).sqrt();
+    let correlation = product / (of_far * of_near).sqrt();
+    Compared {
+        differs: counts & (correlation < least_correlation * largest),
+        correlation: if counts { correlation } else { 0.0 },
+        largest: if counts { largest } else { 0.0 },
+        counted: if counts { 1.0 } else { 0.0 },
+    }
 }
 
 pub(crate) fn sum(values: &[f32]) -> f64 {

@@ -9,9 +9,11 @@ const LARGEST_ALPHA: f32 = 1.2;
 /// Slope of the cubic, relative to c1, below which Newton's step is shortened.
 const SLOPE_FLOOR: f32 = 0.05;
 const STEPS: usize = 3;
+/// Lanes of the widest vector.
+pub(crate) const TOGETHER: usize = 16;
 
 dispatch! {
-    /// Sums over `window` columns: `values` is `window - 1` longer than `sums`; `work` has twice the size.
+    /// Sums over `window` columns: `values` is at least `window - 1` longer than `sums`; `work` has twice the size.
     fn row_sums(values: &[f32], window: usize, work: &mut [f32], sums: &mut [f32]) = row_sums_generic
 }
 
@@ -28,9 +30,11 @@ fn row_sums_generic<L: Lanes>(values: &[f32], window: usize, work: &mut [f32], s
     let (mut here, mut there) = work.split_at_mut(values.len());
     let at = |d: usize| &values[d..][..width];
     // The usual windows in two passes: sums of four, then of those. Their order is that of the loop below.
-    let mut length = values.len() - 3;
+    // Whole vectors, where the values suffice.
+    let mut length = (width + window - 4).next_multiple_of(TOGETHER).min(values.len() - 3);
     let quads = &mut here[..length];
-    let [a, b, c, d] = [0, 1, 2, 3].map(|d| &values[d..d + length]);
+    let (a, b) = (&values[..length], &values[1..][..length]);
+    let (c, d) = (&values[2..][..length], &values[3..][..length]);
     for x in 0..length {
         quads[x] = (a[x] + b[x]) + (c[x] + d[x]);
     }
