@@ -13,7 +13,6 @@ pub const FRAME_HEADER: usize = 17;
 
 /// Header of a frame's pixels.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct FrameHeader {
     /// Trigger number since the board's reset ([`crate::message::ShotRecord::trigger_number`]), the id of
     /// [`Control::Expose`], or [`FREE_RUNNING`] for all free-running images.

@@ -53,7 +53,6 @@ impl Kind {
 
 /// Fields before the body.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Header {
     pub version: u8,
     pub kind: Kind,
@@ -65,7 +64,6 @@ pub struct Header {
 
 /// A frame with a correct CRC and an undecoded body.
 #[derive(Clone, PartialEq, Eq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Packet {
     pub header: Header,
     /// Undecoded postcard body.
@@ -84,7 +82,6 @@ impl Packet {
 
 /// Why bytes between two delimiters are rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum FrameError {
     /// More than [`FRAME_MAX`] bytes without a delimiter.
     TooLong,

@@ -5,7 +5,6 @@
 //! - [`settle`]: when a position counts as reached.
 //! - [`camera`]: frames of the simulator's camera endpoint (TCP, not the serial link).
 #![no_std]
-#![deny(missing_docs)]
 
 pub mod camera;
 pub mod frame;

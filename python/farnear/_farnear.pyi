@@ -14,6 +14,8 @@ Image = Union[NDArray[np.integer[Any]], NDArray[np.floating[Any]], _ArrayLike]
 Map = Image
 Mask = Union[NDArray[np.bool_], NDArray[np.integer[Any]], _ArrayLike]
 Path = Union[str, "os.PathLike[str]"]
+Stack = Union[Sequence[Image], NDArray[Any]]
+Numbers = Union[Sequence[float], NDArray[Any]]
 
 __version__: str
 
@@ -384,7 +386,8 @@ class FocusStack:
     reliability : array float32
         How clear and how well fitted the maximum of sharpness is, 0 to 1.
     all_in_focus : array float32
-        Each pixel from the image in which it is sharpest: 0 to 1 for uint8 and uint16, else in the scale of the images.
+        Each pixel from the image in which it is sharpest: 0 to 1 for uint8 and uint16, else in the scale of the images. 0 where no
+        image shows the pixel.
     moved_px : float or None
         Farthest that alignment moved a pixel, px; None without alignment.
     left_out : list of int
@@ -416,9 +419,9 @@ class FocusStack:
         """-"""
 
 def focus_stack(
-    images: Sequence[Image],
+    images: Stack,
     *,
-    focused_at_mm: Optional[Sequence[float]] = None,
+    focused_at_mm: Optional[Numbers] = None,
     measure: str = "modified-laplacian",
     smoothing_px: float = 1.0,
     window_px: int = 9,
@@ -477,7 +480,8 @@ def points_mm(
     Parameters
     ----------
     depth_mm : array (height, width)
-        Depth map, mm; NaN where there is none.
+        Depth map, mm; NaN where there is none, or any depth within the focal length, such as 0. With optics of
+        `calibrate_stack`, whose depths may be relative, NaN only.
     optics : Optics
         The optics of the map; those of `calibrate_stack` need its `object_pixel_um`.
     part : (int, int, int, int), optional
@@ -760,7 +764,7 @@ class StackFit:
         """-"""
 
 def calibrate_stack(
-    images: Sequence[Image],
+    images: Stack,
     *,
     step_mm: float,
     object_pixel_um: Optional[float] = None,

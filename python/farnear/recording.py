@@ -9,7 +9,7 @@ from typing import Any, Optional, Union
 import numpy as np
 from numpy.typing import NDArray
 
-from ._farnear import DepthMap, FarnearError, Optics, points_mm
+from ._farnear import DepthMap, FarnearError, points_mm
 
 __all__ = ["McapRecording"]
 
@@ -45,17 +45,17 @@ def camera_matrix(found: DepthMap) -> list[float]:
     return [focal_px, 0.0, axis_px[0], 0.0, focal_px, axis_px[1], 0.0, 0.0, 1.0]
 
 
-def points_if_known(found: DepthMap, optics: Optics) -> Optional[NDArray[np.float32]]:
+def points_if_known(found: DepthMap) -> Optional[NDArray[np.float32]]:
     """Points of a map in mm, (height, width, 3); None if the lens was calibrated without the size of a pixel at the target."""
     try:
-        return points_mm(found.depth_mm, optics, part=found.part)
+        return points_mm(found.depth_mm, found.optics, part=found.part)
     except FarnearError:  # of a map `points_mm` raises it for this reason only
         return None
 
 
 def points_m(found: DepthMap) -> Optional[NDArray[np.float32]]:
     """Points of a map in m, (height, width, 3): x to the right, y down, z away from the lens; None as `points_if_known`."""
-    points = points_if_known(found, found.optics)
+    points = points_if_known(found)
     if points is None:
         return None
     return np.ascontiguousarray(points * np.array([1e-3, -1e-3, -1e-3], np.float32)).astype("<f4")

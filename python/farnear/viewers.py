@@ -32,13 +32,17 @@ def _imported(name: str) -> Any:
 
 
 def _grey(image: Pixels) -> NDArray[np.float64]:
-    """Grey values over the whole of their type; of floats over their brightest."""
-    full = np.iinfo(image.dtype).max if np.issubdtype(image.dtype, np.integer) else max(float(image.max()), 1e-9)
-    return np.clip(image / full, 0.0, 1.0)
+    """Grey values over the whole of their type; of floats over their brightest. 0 for masked pixels and NaN."""
+    values = np.ma.filled(image.astype(np.float64), np.nan)
+    if np.issubdtype(image.dtype, np.integer):
+        full = float(np.iinfo(image.dtype).max)
+    else:
+        full = float(np.max(values, initial=1e-9, where=np.isfinite(values)))
+    return np.nan_to_num(np.clip(values / full, 0.0, 1.0))
 
 
 def to_open3d(
-    found: DepthMap, optics: Optics, image: Optional[Pixels] = None, *, min_confidence: float = 0.0
+    found: DepthMap, image: Optional[Pixels] = None, *, min_confidence: float = 0.0
 ) -> "open3d.geometry.PointCloud":
     """Point cloud of a depth map.
 
@@ -46,8 +50,6 @@ def to_open3d(
     ----------
     found : DepthMap
         The map, mm.
-    optics : Optics
-        Optics of the map.
     image : array (height, width), optional
         Grey values of the points.
     min_confidence : float
@@ -61,7 +63,7 @@ def to_open3d(
     open3d = _imported("open3d")
     keep = np.isfinite(found.depth_mm) & (found.confidence >= min_confidence)
     cloud = open3d.geometry.PointCloud()
-    cloud.points = open3d.utility.Vector3dVector(points_mm(found.depth_mm, optics, part=found.part)[keep].astype(np.float64))
+    cloud.points = open3d.utility.Vector3dVector(points_mm(found.depth_mm, found.optics, part=found.part)[keep].astype(np.float64))
     if image is not None:
         _check_size(image, found)
         grey = _grey(image)[keep]
@@ -76,17 +78,14 @@ class RerunView:
 
     Parameters
     ----------
-    optics : Optics
-        Optics of the pairs.
     name : str
         Name of the recording.
     save : str, optional
         Recording (`.rrd`) to write instead of opening the viewer.
     """
 
-    def __init__(self, optics: Optics, *, name: str = "farnear", save: Optional[str] = None) -> None:
+    def __init__(self, *, name: str = "farnear", save: Optional[str] = None) -> None:
         self._rerun = _imported("rerun")
-        self._optics = optics
         self._pairs = 0
         self._recording = self._rerun.RecordingStream(name)
         if save is None:
@@ -112,7 +111,7 @@ class RerunView:
         """
         rerun, recording = self._rerun, self._recording
         _check_size(far, found)
-        points = points_if_known(found, self._optics)
+        points = points_if_known(found)
         recording.set_time("pair", sequence=self._pairs)
         if board_us is not None:
             recording.set_time("board", duration=board_us * 1e-6)

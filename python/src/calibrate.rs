@@ -160,19 +160,20 @@ pub fn calibrate_psf<'py>(
         }
         owned.push(([far.view().to_owned(), near.view().to_owned()], true_mm.map(|mm| optics.0.alpha(mm))));
     }
-    let fit = work::run(py, || {
+    let lens = optics.0;
+    let fit = work::watched(py, move || {
         let mut ready = Vec::with_capacity(owned.len());
         for (images, alpha) in owned {
-            ready.push((made_ready(images, &optics.0, align).map_err(wrong)?.0, alpha));
+            ready.push((made_ready(images, &lens, align).map_err(wrong)?.0, alpha));
         }
         let captured: Vec<CapturedPair<'_>> = ready
             .iter()
             .map(|([far, near], alpha)| CapturedPair { far: far.view(), near: near.view(), alpha: *alpha })
             .collect();
-        fit_psf(&captured, &optics.0, model).map_err(wrong)
+        fit_psf(&captured, &lens, model).map_err(wrong)
     })??;
     Ok(PsfFit {
-        optics: Optics(optics.0.with_psf(fit.psf)),
+        optics: Optics(lens.with_psf(fit.psf)),
         psf: psf_text(fit.psf)?,
         verdict: fit.verdict().to_string(),
         k: fit.width(),

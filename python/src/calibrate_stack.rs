@@ -3,7 +3,7 @@
 use std::sync::atomic::Ordering;
 
 use farnear_depth::calibrate::stack::{self, Moved, StackSettings};
-use farnear_workflows::{calibrate::stack::verdict, figures::rounded_for};
+use farnear_workflows::{calibrate::stack::verdict, figures::rounded_for, focus_stack::fill_specks};
 use ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::prelude::*;
@@ -150,7 +150,15 @@ pub fn calibrate_stack<'py>(
     pair_step: Option<usize>,
     bin: Option<usize>,
 ) -> PyResult<StackFit> {
-    let (slices, _) = stack_of(&images)?;
+    let (mut slices, full_scale) = stack_of(&images)?;
+    for (index, slice) in slices.iter_mut().enumerate() {
+        fill_specks(slice, full_scale.is_none());
+        if let Some(((row, column), _)) = slice.indexed_iter().find(|(_, value)| !value.is_finite()) {
+            return Err(FarnearError::new_err(format!(
+                "images[{index}]: the pixel in column {column}, row {row} has no value: crop or fill it"
+            )));
+        }
+    }
     let settings = StackSettings {
         step_mm,
         moved: Moved::Target { object_pixel_um, far_mm },

@@ -43,13 +43,17 @@ impl Correction {
         let method: Method = method.parse().map_err(wrong)?;
         let mut maps = Vec::with_capacity(patterns.len());
         for (index, (map, true_mm)) in patterns.iter().enumerate() {
-            maps.push((named::<Map<'_>>(&format!("patterns[{index}][0]"), map)?, *true_mm));
+            let map: Map<'_> = named(&format!("patterns[{index}][0]"), map)?;
+            maps.push((map.view().to_owned(), *true_mm));
         }
-        let patterns: Vec<Pattern<'_>> =
-            maps.iter().map(|(map, true_mm)| Pattern { depth_mm: map.view(), true_mm: *true_mm }).collect();
-        work::run(py, || corrections::fit(method, &patterns, &CdcSettings::default()))?
-            .map(Self)
-            .map_err(wrong)
+        let fit = move || {
+            let patterns: Vec<Pattern<'_>> = maps
+                .iter()
+                .map(|(map, true_mm)| Pattern { depth_mm: map.view(), true_mm: *true_mm })
+                .collect();
+            corrections::fit(method, &patterns, &CdcSettings::default())
+        };
+        work::watched(py, fit)?.map(Self).map_err(wrong)
     }
 
     /// Read a correction from the TOML that `farnear calibrate correction --out` writes.

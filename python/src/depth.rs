@@ -3,14 +3,14 @@
 use farnear_depth::{
     adaptive_window::Window,
     fill::{FillBy, LowTexture},
-    measure::{DepthMethod, Finding, MeasureSettings, binned, measure_pair_of_views},
+    measure::{DepthMethod, Finding, MeasureError, MeasureSettings, binned, measure_pair_of_views},
     mosaic::is_mosaic,
     operators,
     pipeline::{self, Settings},
     prepare::PrepareSettings,
 };
 use farnear_workflows::{
-    depth::DepthRequest,
+    depth::{DepthRequest, tone},
     optics::{OpticsDoubt, another_size, usable_bin},
 };
 use std::sync::{Mutex, PoisonError};
@@ -209,8 +209,13 @@ pub fn depth(
     let white = settings.prepare.limits.filter(|_| white_level.is_some()).map(|[_, white]| white);
     let (far, near) = (up_to(&far, white, side), up_to(&near, white, side));
     let (far, near) = (far.view(), near.view());
-    let mut found = work::run(py, || measure_pair_of_views(far, near, &optics.0, method, None, &settings))?
-        .map_err(wrong)?;
+    let (mut found, curved) = work::run(py, || {
+        let found = measure_pair_of_views(far, near, &optics.0, method, None, &settings)?;
+        let curved = tone::doubt(&found.prepared.far, &found.prepared.near);
+        Ok::<_, MeasureError>((found, curved))
+    })?
+    .map_err(wrong)?;
+    found.findings.extend(curved.map(Finding::Run));
     found.findings.extend(doubts.into_iter().map(|doubt| Finding::Run(doubt.to_string())));
     Ok(DepthMap::of(py, found, optics))
 }

@@ -26,7 +26,7 @@ use crate::{
 pub type Place = (usize, usize, usize, usize);
 
 pub fn part_of((x, y, image_width, image_height): Place) -> Part {
-    Part { x, y, image_width, image_height }
+    Part { x, y, image_width, image_height, bin: 1 }
 }
 
 /// Used contents of `depth.toml`; the command line writes more.
@@ -191,7 +191,10 @@ impl DepthMap {
             reasons: reasons.into_pyarray(py).unbind(),
             findings: record.warnings,
             optics: Optics(record.optics),
-            part: record.part.map(|part| (part.x, part.y, part.image_width, part.image_height)),
+            part: record
+                .part
+                .filter(|part| part.bin == 1)
+                .map(|part| (part.x, part.y, part.image_width, part.image_height)),
         })
     }
 
@@ -243,7 +246,7 @@ impl DepthMap {
         let (x, y, columns, rows) = region.unwrap_or((0, 0, width, height));
         let ends = (x.checked_add(columns), y.checked_add(rows));
         let (Some(right), Some(bottom)) = ends else {
-            return Err(FarnearError::new_err(format!("region {region:?} is too large")));
+            return Err(FarnearError::new_err(format!("region {:?} is too large", (x, y, columns, rows))));
         };
         if right > width || bottom > height {
             let message = format!(

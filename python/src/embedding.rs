@@ -22,8 +22,8 @@ pub fn isomap<'py>(
     neighbours: usize,
     dimensions: usize,
 ) -> PyResult<Laid<'py>> {
-    let samples = samples.view();
-    let found = work::run(py, || lay_out(samples, neighbours, dimensions))?;
+    let samples = samples.view().to_owned();
+    let found = work::watched(py, move || lay_out(samples.view(), neighbours, dimensions))?;
     let found = found.map_err(|error| match &error {
         EmbeddingError::Disconnected { .. } => DisconnectedError::new_err(error.to_string()),
         _ => wrong(error),
@@ -53,8 +53,10 @@ impl Rbf {
         gamma: f32,
         ridge: f64,
     ) -> PyResult<Self> {
-        let (samples, targets) = (samples.view(), targets.view());
-        work::run(py, || rbf::Rbf::train(samples, targets, gamma, ridge))?.map(Self).map_err(wrong)
+        let (samples, targets) = (samples.view().to_owned(), targets.view().to_owned());
+        work::watched(py, move || rbf::Rbf::train(samples.view(), targets.view(), gamma, ridge))?
+            .map(Self)
+            .map_err(wrong)
     }
 
     /// Coordinates, float32 (m, d), of samples, float32 (m, features).

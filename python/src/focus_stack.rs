@@ -37,7 +37,8 @@ use crate::{
 /// reliability : array float32
 ///     How clear and how well fitted the maximum of sharpness is, 0 to 1.
 /// all_in_focus : array float32
-///     Each pixel from the image in which it is sharpest: 0 to 1 for uint8 and uint16, else in the scale of the images.
+///     Each pixel from the image in which it is sharpest: 0 to 1 for uint8 and uint16, else in the scale of the images. 0 where no
+///     image shows the pixel.
 /// moved_px : float or None
 ///     Farthest that alignment moved a pixel, px; None without alignment.
 /// left_out : list of int

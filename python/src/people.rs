@@ -81,6 +81,12 @@ pub fn remove_shadow<'py>(
     method: &str,
 ) -> PyResult<(Bound<'py, PyArray2<bool>>, Bound<'py, PyDict>)> {
     let mask: Mask = named("mask", mask)?;
+    if !(-90.0..=90.0).contains(&elevation_deg) {
+        return Err(FarnearError::new_err(format!("elevation_deg is {elevation_deg}; expected -90 to 90")));
+    }
+    if !azimuth_deg.is_finite() {
+        return Err(FarnearError::new_err(format!("azimuth_deg is {azimuth_deg}; expected an angle")));
+    }
     let file = CameraFile::parse(camera).map_err(wrong)?;
     let method: Method = method.parse().map_err(FarnearError::new_err::<String>)?;
     let sun = SunPosition { elevation_deg, azimuth_deg };

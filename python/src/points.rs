@@ -15,7 +15,8 @@ use crate::{
 /// Parameters
 /// ----------
 /// depth_mm : array (height, width)
-///     Depth map, mm; NaN where there is none.
+///     Depth map, mm; NaN where there is none, or any depth within the focal length, such as 0. With optics of
+///     `calibrate_stack`, whose depths may be relative, NaN only.
 /// optics : Optics
 ///     The optics of the map; those of `calibrate_stack` need its `object_pixel_um`.
 /// part : (int, int, int, int), optional
@@ -42,7 +43,9 @@ pub fn points_mm<'py>(
 ) -> PyResult<Bound<'py, PyArray3<f32>>> {
     let depth_mm: Map<'py> = named("depth_mm", depth_mm)?;
     let optics = &*optics_named("optics", optics)?;
-    let depth_mm = depth_mm.view();
+    // Integer maps mark holes by 0, and nothing within the focal length is imaged. `calibrate_stack` gives relative depths.
+    let limit_mm = optics.0.stage().map_or(optics.0.focal_length_mm() as f32, |_| f32::NEG_INFINITY);
+    let depth_mm = depth_mm.view().mapv(|mm| if mm > limit_mm { mm } else { f32::NAN });
     let (rows, columns) = depth_mm.dim();
     let lies_within =
         |begin: usize, size: usize, all: usize| begin.checked_add(size).is_some_and(|end| end <= all);
@@ -54,6 +57,6 @@ pub fn points_mm<'py>(
         )));
     }
     let part = part.map(part_of);
-    let points = work::run(py, || farnear_workflows::measure::points_mm(depth_mm, &optics.0, part))?;
+    let points = work::run(py, || farnear_workflows::measure::points_mm(depth_mm.view(), &optics.0, part))?;
     Ok(points.map_err(wrong)?.into_pyarray(py))
 }

@@ -40,7 +40,9 @@ impl Recogniser {
     #[pyo3(signature = (model=PathBuf::from("everyday")))]
     fn new(py: Python<'_>, model: PathBuf) -> PyResult<Self> {
         let read = py.detach(|| Model::read(&model)).map_err(wrong)?;
-        Ok(Self { model: read, path: model })
+        // An unpickled copy may be made in another folder.
+        let file = Model::file(&model).map(std::path::absolute).transpose()?;
+        Ok(Self { model: read, path: file.unwrap_or(model) })
     }
 
     /// Activities that it can answer.

@@ -55,7 +55,7 @@ pub fn synthetic_masks<'py>(
     if !(1.0..=1000.0).contains(&rate_hz) {
         return Err(FarnearError::new_err(format!("rate_hz = {rate_hz} is not in 1 to 1000")));
     }
-    let frames = work::run(py, || {
+    let frames = work::watched(py, move || {
         let bodies = performance(subject, number, 0, rate_hz);
         let view = View { alpha_deg: 0.0, beta_deg: 0.0, gamma_deg: azimuth_deg };
         let reach: Vec<_> = bodies.iter().flat_map(|body| extent(body, &view)).collect();

@@ -18,6 +18,8 @@ use crate::errors::FarnearError;
 
 /// Polling interval for interruptions.
 const LOOK: Duration = Duration::from_millis(2);
+/// The first interval, which doubles up to [`LOOK`]: short work ends without a wait.
+const FIRST_LOOK: Duration = Duration::from_micros(20);
 
 /// The process that imported this module. Its children by `os.fork`, as those of `multiprocessing`, have none of its threads.
 static IMPORTED_BY: LazyLock<u32> = LazyLock::new(process::id);
@@ -70,8 +72,10 @@ pub fn interruptibly<T: Send>(
 pub fn watched<T: Send + 'static>(py: Python<'_>, work: impl FnOnce() -> T + Send + 'static) -> PyResult<T> {
     let pool = of_child()?;
     let worker = thread::spawn(move || in_pool(pool.as_deref(), work));
+    let mut pause = FIRST_LOOK;
     while !worker.is_finished() {
-        py.detach(|| thread::sleep(LOOK));
+        py.detach(|| thread::sleep(pause));
+        pause = (pause * 2).min(LOOK);
         py.check_signals()?;
     }
     worker.join().map_err(panicked)

@@ -27,6 +27,12 @@ def test_depth_of_a_slant_is_its_depth(optics, slant):
     assert np.nanmean(z < 3) > 0.9
 
 
+def test_a_tone_curve_is_found(optics, slant):
+    curved = [(image / 255) ** (1 / 2.2) for image in slant[:2]]
+    findings = farnear.depth(*curved, optics).findings
+    assert any("not linear in light" in finding for finding in findings), findings
+
+
 def test_methods_agree(optics, slant):
     far, near, truth = slant
     for method in ["whitened", "subbarao"]:

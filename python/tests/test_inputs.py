@@ -2,8 +2,11 @@
 
 import copy
 import multiprocessing
+import os
 import pickle
+import signal
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -192,6 +195,8 @@ def test_a_plane_is_measured(optics):
         assert getattr(copied, name) == getattr(plane, name), name
     with pytest.raises(farnear.FarnearError, match="160x120"):
         farnear.depth(far, near, optics).plane((150, 0, 20, 20))
+    with pytest.raises(farnear.FarnearError, match=r"region \(18446744073709551615, 0, 20, 20\) is too large"):
+        farnear.depth(far, near, optics).plane((2**64 - 1, 0, 20, 20))
 
 
 def test_a_focus_stack_has_its_distances(optics):
@@ -298,6 +303,46 @@ def test_a_lens_is_calibrated_from_a_stack_and_measures_its_pairs():
         farnear.points_mm(found.depth_mm, fit.optics)
     with pytest.raises(farnear.FarnearError, match="2 slices"):
         farnear.calibrate_stack(slices[:2], step_mm=0.1)
+
+
+def _flat_pairs(optics):
+    far, near, _ = farnear.render(optics, "plane:931", width=320, height=240)
+    return [(far, near, 931.0)] * 80
+
+
+def _flat_maps(_):
+    random = np.random.default_rng(1)
+    return [(random.normal(mm, 0.1, (480, 640)).astype(np.float32), mm) for mm in np.linspace(890, 930, 30)]
+
+
+def _samples(_):
+    return np.random.default_rng(1).random((5000, 360), np.float32)
+
+
+LONG = {
+    "calibrate_psf": (_flat_pairs, lambda pairs, optics: farnear.calibrate_psf(pairs, optics, model="free")),
+    "Correction.fit": (_flat_maps, lambda maps, _: farnear.Correction.fit(maps, method="cdc")),
+    "isomap": (_samples, lambda samples, _: _farnear.isomap(samples, neighbours=10)),
+}
+
+
+@pytest.mark.parametrize("name", LONG)
+def test_ctrl_c_ends_a_long_calculation(optics, name):
+    prepare, calculate = LONG[name]
+    given = prepare(optics)
+    # A process in the background of a script ignores it.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        interrupt = threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT))
+        begin = time.monotonic()
+        interrupt.start()
+        with pytest.raises(KeyboardInterrupt):
+            calculate(given, optics)
+        # The whole calculation takes far longer.
+        assert time.monotonic() - begin < 3.0
+    finally:
+        interrupt.cancel()
+        signal.signal(signal.SIGINT, before)
 
 
 def _median_mm(far, near, optics):

@@ -1,10 +1,14 @@
+import pickle
+import shutil
 from datetime import datetime, timedelta, timezone
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import farnear
 
+MODEL = Path(__file__).resolve().parents[2] / "host" / "recognition" / "models" / "everyday-cut-out.fnm"
 CAMERA = """
 [camera]
 height_m = 0.8
@@ -48,6 +52,25 @@ def test_a_shadow_is_cut_off():
         farnear.remove_shadow(np.ones((48, 64), bool), CAMERA, elevation_deg=30, azimuth_deg=130)
     with pytest.raises(farnear.FarnearError, match="empty|no subject|nobody"):
         farnear.remove_shadow(np.zeros((480, 640), bool), CAMERA, elevation_deg=30, azimuth_deg=130)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"elevation_deg": 91}, {"elevation_deg": float("nan")}, {"azimuth_deg": float("inf")}], ids=str
+)
+def test_a_sun_that_cannot_be_is_refused_by_its_angle(wrong):
+    (name,) = wrong
+    with pytest.raises(farnear.FarnearError, match=name):
+        farnear.remove_shadow(person(True), CAMERA, **{"elevation_deg": 30, "azimuth_deg": 130, **wrong})
+
+
+def test_a_recogniser_of_a_file_is_unpickled_in_another_folder(tmp_path, monkeypatch):
+    if not MODEL.is_file():
+        pytest.skip("the sources are not there")
+    shutil.copy(MODEL, tmp_path / "own.fnm")
+    monkeypatch.chdir(tmp_path)
+    pickled = pickle.dumps(farnear.Recogniser("own.fnm"))
+    monkeypatch.chdir(tmp_path.parent)
+    assert pickle.loads(pickled).activities
 
 
 def test_descriptors_follow_the_shape():

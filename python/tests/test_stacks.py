@@ -35,6 +35,16 @@ def test_an_image_of_another_scene_is_left_out(images):
     assert farnear.focus_stack(images, use_all=True).left_out == []
 
 
+def test_a_wild_or_missing_value_costs_its_pixel(images):
+    images[3][20, 30], images[4][40, 50] = 1e30, np.nan
+    found = farnear.focus_stack(images)
+    assert found.left_out == [] and np.isnan(found.depth[[20, 40], [30, 50]]).all()
+    assert np.isfinite(found.depth[20, 31])
+    images[2][10:20, 10:20] = np.nan
+    with pytest.raises(farnear.FarnearError, match=r"images\[2\].*has no value"):
+        farnear.calibrate_stack(images, step_mm=0.1)
+
+
 def test_a_stack_is_pickled(images):
     images[1] = blurred(3, seed=2)
     found = farnear.focus_stack(images)

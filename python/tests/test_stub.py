@@ -58,6 +58,7 @@ name: str = farnear.__version__ + fit.verdict
 depth: farnear.DepthMap = farnear.DepthMap.load("folder")
 tilt: float = depth.plane((0, 0, 10, 10)).tilt_deg
 stack: farnear.FocusStack = farnear.focus_stack([far, near, far.astype(np.float16)], focused_at_mm=[1, 2, 3])
+cube: farnear.FocusStack = farnear.focus_stack(np.stack([far, near, far]), focused_at_mm=np.linspace(1, 2, 3))
 left_out: list[int] = farnear.focus_stack([far, near, far], use_all=True).left_out
 points = farnear.points_mm(depth.depth_mm, optics, part=depth.part)
 mask, report = farnear.remove_shadow(found.depth_mm > 0, "camera", elevation_deg=40, azimuth_deg=100)

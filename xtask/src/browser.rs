@@ -16,7 +16,7 @@ use crate::{
 /// Used if `CHROMIUM` is not set.
 const BROWSERS: [&str; 3] = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
 
-const TESTS: [&str; 3] = ["page.test.mjs", "rows.test.mjs", "results.test.mjs"];
+const TESTS: [&str; 4] = ["page.test.mjs", "rows.test.mjs", "results.test.mjs", "access.test.mjs"];
 
 /// Counts the tests as skipped if tools are missing.
 pub fn run() -> Result<Total> {

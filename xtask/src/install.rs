@@ -1,16 +1,14 @@
-use std::{fs, path::PathBuf};
+use std::fs;
 
 use anyhow::{Context, Result};
 
-use crate::{boards::BOARDS, firmware, host};
+use crate::{boards::BOARDS, firmware, host, run::cargo_home};
 
 /// Copies the programs and the firmware's ELF into cargo's bin folder.
 pub fn run() -> Result<()> {
     firmware::build()?;
     let built = host::build_release()?;
-    let home = std::env::var_os("CARGO_HOME")
-        .map(PathBuf::from)
-        .or_else(|| std::env::home_dir().map(|home| home.join(".cargo")))
+    let home = cargo_home()
         .context("no home folder: set CARGO_HOME to the folder with the bin/ for the programs")?;
     let bin = home.join("bin");
     fs::create_dir_all(&bin).with_context(|| format!("cannot create {}", bin.display()))?;

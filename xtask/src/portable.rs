@@ -10,7 +10,7 @@ use anyhow::{Context, Result, bail};
 
 use crate::{
     firmware, python,
-    run::{ROOT, cargo, finish, has, has_target, output, step, succeeds, target_folder},
+    run::{ROOT, add_target, cargo, finish, has, output, step, succeeds, target_folder},
 };
 
 const WINDOWS: &str = "x86_64-pc-windows-gnu";
@@ -26,9 +26,7 @@ pub fn run() -> Result<()> {
     for target in TARGETS {
         // Nothing is linked, so no foreign linker is needed.
         step(&format!("all programs for {target}"));
-        if !has_target(target) && !succeeds(Command::new("rustup").args(["target", "add", target])) {
-            bail!("the target is missing: rustup target add {target}");
-        }
+        add_target(target).map_err(anyhow::Error::msg)?;
         finish(cargo(["check", "--lib", "--bins", "--target", target]).args(python::OTHERS))?;
     }
     if has("wine") && has(LINKER) {

@@ -102,6 +102,19 @@ pub fn has_target(triple: &str) -> bool {
     })
 }
 
+/// Lets rustup add a target that is missing; fails with the command to type.
+pub fn add_target(triple: &str) -> Result<(), String> {
+    if has_target(triple) || succeeds(Command::new("rustup").args(["target", "add", triple])) {
+        return Ok(());
+    }
+    Err(format!("the target is missing: rustup target add {triple}"))
+}
+
+pub fn cargo_home() -> Option<PathBuf> {
+    let usual = || std::env::home_dir().map(|home| home.join(".cargo"));
+    std::env::var_os("CARGO_HOME").map(PathBuf::from).or_else(usual)
+}
+
 pub fn describe(command: &Command) -> String {
     let words = std::iter::once(command.get_program()).chain(command.get_args());
     words.map(|word| word.to_string_lossy()).collect::<Vec<_>>().join(" ")

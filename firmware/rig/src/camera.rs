@@ -11,7 +11,9 @@ use crate::io::{ExposureEdges, Inputs, Trigger};
 use crate::settings::CameraSettings;
 
 /// Permitted shortening of the strobe: cameras count exposure in lines of some 10 us.
-const SHORTER_US: u64 = 100;
+const SHORTER_US: u32 = 100;
+/// Divisor of the exposure for the part that is permitted, too: two crystals differ by 50 ppm each, plus a margin.
+const CLOCKS_APART: u32 = 5_000;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Awaited {
@@ -66,7 +68,8 @@ impl Camera {
         let end = at.0 + u64::from(exposure.0) + u64::from(self.settings.strobe_deadline.0);
         self.ready_at = BoardMicros(end + u64::from(self.settings.readout.0));
         self.order = Some(Trigger { at, length: exposure, flash });
-        let shortest_us = u64::from(exposure.0).saturating_sub(SHORTER_US);
+        let shorter_us = SHORTER_US + exposure.0 / CLOCKS_APART;
+        let shortest_us = u64::from(exposure.0.saturating_sub(shorter_us));
         self.expect(BoardMicros(end), Awaited::Triggered, shortest_us)
     }
 
@@ -161,5 +164,24 @@ mod tests {
             camera.result(number).map(|edges| edges.is_ok())
         };
         assert_eq!([0, 90, 859].map(answer), [Some(true), Some(true), Some(false)]);
+    }
+
+    #[test]
+    fn a_long_exposure_may_differ_by_the_clocks_of_camera_and_board() {
+        let answer = |shorter_us: u64| {
+            let mut camera = Camera::new(Settings::DEFAULT.camera);
+            let number = camera.trigger(Micros(1_000_000), None, BoardMicros(1_000));
+            let edges = ExposureEdges {
+                trigger: BoardMicros(1_000),
+                strobe_start: BoardMicros(1_020),
+                strobe_end: BoardMicros(1_001_020 - shorter_us),
+                flash: None,
+            };
+            let now = BoardMicros(1_001_100);
+            camera.sense(&Inputs { exposure: Some(edges), ..Inputs::idle(now) });
+            camera.result(number).map(|edges| edges.is_ok())
+        };
+        // 200 ppm and 100 us.
+        assert_eq!([0, 150, 300, 301].map(answer), [Some(true), Some(true), Some(true), Some(false)]);
     }
 }

@@ -39,6 +39,8 @@ pub struct Camera {
     was_busy_until_ns: u64,
     free_run: Option<FreeRun>,
     triggers: u32,
+    /// Number of the next exposure by the trigger line.
+    next_number: u32,
     missed: u32,
     ignores: bool,
     delay_ns: u64,
@@ -55,6 +57,7 @@ impl Camera {
             was_busy_until_ns: 0,
             free_run: None,
             triggers: 0,
+            next_number: 0,
             missed: 0,
             ignores: false,
             delay_ns: 0,
@@ -81,13 +84,15 @@ impl Camera {
     pub fn trigger(&mut self, now_ns: u64, rising: bool) {
         if rising {
             self.triggers += 1;
+            let number = self.next_number;
+            self.next_number = number.wrapping_add(1);
             if self.ignores || self.is_busy(now_ns) {
                 self.missed += 1;
                 return;
             }
             self.armed = true;
             self.latency_ns = self.latency();
-            self.coming.insert(now_ns + self.latency_ns, Edge::Begin(self.triggers - 1));
+            self.coming.insert(now_ns + self.latency_ns, Edge::Begin(number));
         } else if self.armed {
             self.armed = false;
             // The end must follow the beginning of an exposure.
@@ -166,8 +171,16 @@ impl Camera {
         self.armed || !self.coming.is_empty()
     }
 
+    /// The board's number of its next exposure. It also numbers exposures that the trigger line does not show.
+    pub fn board_numbers(&mut self, next: u32) {
+        // A report may arrive after the next trigger.
+        if next.wrapping_sub(self.next_number) as i32 > 0 {
+            self.next_number = next;
+        }
+    }
+
     pub fn board_reset(&mut self) {
-        self.triggers = 0;
+        (self.triggers, self.next_number) = (0, 0);
     }
 }
 
@@ -191,6 +204,24 @@ mod tests {
         camera.trigger(16_001_000, false);
         camera.trigger(17_000_000, true);
         assert!(camera.next_ns().is_some());
+    }
+
+    #[test]
+    fn triggers_continue_with_the_boards_number() {
+        let mut camera = Camera::new(1);
+        let begins = [(1, None), (2, Some(7)), (3, Some(5))].map(|(turn, reported)| {
+            reported.into_iter().for_each(|next| camera.board_numbers(next));
+            camera.trigger(turn * 100_000_000, true);
+            camera.trigger(turn * 100_000_000 + 5_000_000, false);
+            let begin = camera.due(turn * 100_000_000 + 50_000_000).map(|(_, edge)| edge);
+            camera.due(turn * 100_000_000 + 50_000_000);
+            begin
+        });
+        assert_eq!(begins, [0, 7, 8].map(|number| Some(Edge::Begin(number))));
+        camera.board_reset();
+        camera.trigger(400_000_000, true);
+        let first = camera.due(450_000_000).map(|(_, edge)| edge);
+        assert_eq!((first, camera.triggers()), (Some(Edge::Begin(0)), 1));
     }
 
     #[test]

@@ -183,6 +183,9 @@ impl Driver {
             }
             self.schedule.notice(moment, now_ns);
         }
+        if let Some(next) = self.observer.take_next_exposure() {
+            self.wiring.camera_mut().board_numbers(next);
+        }
         if let Some(vcd) = self.vcd() {
             vcd.received(now_ns, &bytes);
         }
@@ -203,8 +206,9 @@ impl Driver {
         for shot in shots {
             self.schedule.notice(Moment::ExposureEnds, now_ns);
             self.observer.note(shot.end_ns, Seen::Exposed(shot));
-            self.patience.expose();
-            let _ = self.outlets.shots.send(shot); // the receiver may have gone
+            if self.patience.expose() {
+                let _ = self.outlets.shots.send(shot); // the receiver may have gone
+            }
         }
     }
 
@@ -358,6 +362,7 @@ impl Driver {
         }
         if powered != self.powered {
             self.observer.note(at.0, Seen::Powered(powered));
+            self.line.lose();
         }
         if powered != self.powered && !powered && session.board_mut().chip.is_cut() {
             // The DAC's output drops with its supply; the amplifier stays on.

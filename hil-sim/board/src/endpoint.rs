@@ -1,7 +1,8 @@
 //! Camera endpoint: sends frames and receives control messages on loopback TCP. Accepts one client; others
-//! receive [`IN_USE`]. Each frame is sent once; frames left by a client are dropped.
+//! receive [`IN_USE`]. Each frame is sent once; frames left by a client are dropped, and its free run ends.
 
 use std::{
+    cell::Cell,
     collections::VecDeque,
     io::{Read, Write},
     net::{Ipv4Addr, Shutdown, SocketAddr, TcpListener, TcpStream},
@@ -10,7 +11,10 @@ use std::{
     time::Duration,
 };
 
-use farnear_protocol::camera::{Control, IN_USE};
+use farnear_protocol::{
+    camera::{Control, IN_USE},
+    units::Micros,
+};
 
 use crate::error::SimError;
 
@@ -86,7 +90,17 @@ fn accept(listener: &TcpListener, shared: &Shared, control: &(impl Fn(Control) +
         let (control, shared) = (control.clone(), shared.clone());
         // Without a reader thread the client still gets its frames.
         let _ = thread::Builder::new().name("camera control".into()).spawn(move || {
-            listen(reader, &control);
+            let runs_freely = Cell::new(false);
+            listen(reader, &|message| {
+                if let Control::FreeRun { period, .. } = message {
+                    runs_freely.set(period.0 > 0);
+                }
+                control(message);
+            });
+            // As a GigE Vision camera without heartbeat; one that runs freely ignores triggers.
+            if runs_freely.get() {
+                control(Control::FreeRun { period: Micros(0), exposure: Micros(0) });
+            }
             forget(&shared, number);
         });
     }
@@ -167,6 +181,13 @@ mod tests {
 
     const LONG: Duration = Duration::from_secs(20);
 
+    fn tell(client: &mut TcpStream, control: Control) {
+        let mut body = [0; 16];
+        let body = postcard::to_slice(&control, &mut body).expect("fits");
+        client.write_all(&(body.len() as u32).to_le_bytes()).expect("open");
+        client.write_all(body).expect("open");
+    }
+
     fn connect(address: SocketAddr) -> TcpStream {
         let client = TcpStream::connect(address).expect("loopback");
         client.set_read_timeout(Some(LONG)).expect("a socket");
@@ -190,10 +211,7 @@ mod tests {
         client.read_exact(&mut bytes).expect("both frames");
         assert_eq!(bytes, [1, 2, 3, 4]);
 
-        let mut body = [0; 16];
-        let body = postcard::to_slice(&Control::AdvanceMicros(1234), &mut body).expect("fits");
-        client.write_all(&(body.len() as u32).to_le_bytes()).expect("open");
-        client.write_all(body).expect("open");
+        tell(&mut client, Control::AdvanceMicros(1234));
         assert_eq!(hear.recv_timeout(LONG), Ok(Control::AdvanceMicros(1234)));
 
         // A second client is refused; the first is not disturbed.
@@ -212,5 +230,28 @@ mod tests {
         frames.send(vec![7]).expect("open");
         third.read_exact(&mut bytes[..1]).expect("the frame");
         assert_eq!(bytes[0], 7);
+    }
+
+    #[test]
+    fn the_free_run_of_a_client_that_vanishes_ends() {
+        let (_frames, receiver) = mpsc::channel();
+        let (heard, hear) = mpsc::channel();
+        let address =
+            open(receiver, move |message| heard.send(message).expect("heard"), || {}).expect("loopback");
+        let run = |period| Control::FreeRun { period: Micros(period), exposure: Micros(5_000) };
+        let mut client = connect(address);
+        tell(&mut client, run(40_000));
+        drop(client);
+        assert_eq!(hear.recv_timeout(LONG), Ok(run(40_000)));
+        let end = hear.recv_timeout(LONG);
+        assert!(matches!(end, Ok(Control::FreeRun { period: Micros(0), .. })), "{end:?}");
+        // A client that has ended it leaves a free run of another program alone.
+        let mut client = connect(address);
+        tell(&mut client, run(40_000));
+        tell(&mut client, run(0));
+        drop(client);
+        tell(&mut connect(address), Control::AdvanceMicros(1));
+        let rest: Vec<_> = (0..3).map(|_| hear.recv_timeout(LONG)).collect();
+        assert_eq!(rest, [Ok(run(40_000)), Ok(run(0)), Ok(Control::AdvanceMicros(1))]);
     }
 }

@@ -9,6 +9,8 @@ pub enum SimError {
     Memory { path: PathBuf, length: usize, expected: usize },
     #[error("{} was changed during this run, whose memory is not written: give each rig its own file", path.display())]
     MemoryChanged { path: PathBuf },
+    #[error("{} has something else than a trace, which would replace it: name another file for the trace", .0.display())]
+    NotATrace(PathBuf),
     #[error("no firmware at {}: run `cargo xtask firmware` to build it, or name an ELF with --firmware", .0.display())]
     NoFirmware(PathBuf),
     #[error("the firmware {} cannot be loaded: {reason}", path.display())]

@@ -212,17 +212,10 @@ impl Lockstep {
                 }
                 return;
             }
-            EventKind::ShotDone { .. }
-            | EventKind::Flash { .. }
-            | EventKind::Alarm(_)
-            | EventKind::AlarmCleared { .. }
-            | EventKind::RecordRepaired { .. } => return,
-            EventKind::Homed { request, .. }
-            | EventKind::MoveDone { request, .. }
-            | EventKind::ProgramDone { request, .. }
-            | EventKind::ContinuousDone { request, .. }
-            | EventKind::Calibrated { request, .. }
-            | EventKind::Failed { request, .. } => request,
+            _ => match event.kind.ended() {
+                Some(request) => request,
+                None => return,
+            },
         };
         self.running.remove(&ended);
         self.paused = self.paused.filter(|paused| *paused != ended);

@@ -1,5 +1,7 @@
 //! `farnear-sim`: the emulated rig for any client.
 
+mod hang_up;
+
 use std::{
     io::Write,
     net::SocketAddr,
@@ -266,7 +268,7 @@ fn serve(run: &Run) -> Result<()> {
     let port = link.as_ref().map_or(rig.port.clone(), |link| link.0.display().to_string());
     #[cfg(not(unix))]
     let port = rig.port.clone();
-    ctrlc::set_handler(rig.stopper()).context("cannot listen to signals")?;
+    hang_up::keep_ignored(|| ctrlc::set_handler(rig.stopper())).context("cannot listen to signals")?;
     let stop = rig.stopper();
     if stdin_is_a_pipe() {
         std::thread::spawn(move || {

@@ -3,6 +3,7 @@
 use farnear_protocol::{
     Call, Event, EventKind, RequestError, Response,
     frame::{Decoder, Kind, Packet},
+    message::ProgramState,
 };
 
 use crate::{
@@ -81,6 +82,9 @@ pub struct Observer {
     to_board: Decoder,
     from_board: Decoder,
     sights: Vec<Sight>,
+    /// Boot of the last start.
+    boot: Option<u32>,
+    next_exposure: Option<u32>,
 }
 
 impl Observer {
@@ -121,6 +125,13 @@ impl Observer {
         for byte in bytes {
             let Some(Ok(packet)) = self.from_board.push(*byte) else { continue };
             if let Some((moment, seen)) = read(&packet, truth) {
+                if moment == Some(Moment::Started) {
+                    self.boot = Some(packet.header.boot);
+                }
+                // Frames of the boot before may still be under way.
+                if self.boot == Some(packet.header.boot) {
+                    self.next_exposure = next_exposure(&seen).or(self.next_exposure);
+                }
                 moments.extend(moment);
                 self.note(at_ns, seen);
             }
@@ -128,9 +139,37 @@ impl Observer {
         moments
     }
 
+    /// The board's number of its next exposure, if it has reported one since the last call.
+    pub fn take_next_exposure(&mut self) -> Option<u32> {
+        self.next_exposure.take()
+    }
+
     /// Drops the unfinished frame.
     pub fn reset(&mut self) {
         self.from_board = Decoder::new();
+        (self.boot, self.next_exposure) = (None, None);
+    }
+}
+
+fn next_exposure(seen: &Seen) -> Option<u32> {
+    match seen {
+        Seen::Reported { event, .. } => match &event.kind {
+            EventKind::ShotReady { trigger_number, .. } => Some(trigger_number.wrapping_add(1)),
+            EventKind::ShotDone { shot, .. } | EventKind::FrameTaken { shot, .. } => {
+                Some(shot.trigger_number.wrapping_add(1))
+            }
+            _ => None,
+        },
+        Seen::Answered { answer, .. } => match &**answer {
+            // Otherwise the pulse of the last exposure may be still to come.
+            Ok(Response::Status(status))
+                if matches!(status.program.state, ProgramState::Idle | ProgramState::Armed) =>
+            {
+                Some(status.triggers)
+            }
+            _ => None,
+        },
+        _ => None,
     }
 }
 

@@ -9,6 +9,8 @@ use std::{
 };
 
 const WAITING_MAX: usize = 8;
+/// Exposures that wait for a client that fetches none; its camera drops further ones.
+const KEPT_MAX: usize = 10_000;
 /// Wall-clock timeout without a transfer; after it no client is assumed.
 const PATIENCE: Duration = Duration::from_secs(1);
 
@@ -79,10 +81,14 @@ impl Patience {
         Self { pictures, last: 0, since: None }
     }
 
-    pub fn expose(&self) {
-        if let Some(pictures) = &self.pictures {
+    /// Counts an exposure; returns whether the camera keeps it.
+    pub fn expose(&self) -> bool {
+        let Some(pictures) = &self.pictures else { return true };
+        let keeps = pictures.waiting() < KEPT_MAX;
+        if keeps {
             pictures.expose();
         }
+        keeps
     }
 
     pub fn end_free_run(&self) {
@@ -111,13 +117,21 @@ mod tests {
         let pictures = Arc::new(Pictures::default());
         let mut patience = Patience::new(Some(Arc::clone(&pictures)));
         for _ in 1..WAITING_MAX {
-            patience.expose();
-            assert!(!patience.is_asked());
+            assert!(patience.expose() && !patience.is_asked());
         }
-        patience.expose();
-        assert!(patience.is_asked());
+        assert!(patience.expose() && patience.is_asked());
         pictures.finish();
         assert!(!patience.is_asked());
+    }
+
+    #[test]
+    fn a_client_that_fetches_nothing_leaves_a_bounded_number_of_exposures() {
+        let pictures = Arc::new(Pictures::default());
+        let patience = Patience::new(Some(Arc::clone(&pictures)));
+        let kept = (0..3 * KEPT_MAX).filter(|_| patience.expose()).count();
+        assert_eq!((kept, pictures.waiting()), (KEPT_MAX, KEPT_MAX));
+        pictures.finish();
+        assert!(patience.expose(), "it fetches again");
     }
 
     #[test]
@@ -136,10 +150,10 @@ mod tests {
     fn only_the_last_pictures_of_an_ended_free_run_are_rendered() {
         let pictures = Arc::new(Pictures::default());
         let patience = Patience::new(Some(Arc::clone(&pictures)));
-        (0..=WAITING_MAX).for_each(|_| patience.expose());
+        assert!((0..=WAITING_MAX).all(|_| patience.expose()));
         assert!(!pictures.is_of_ended_run(0));
         patience.end_free_run();
-        patience.expose();
+        assert!(patience.expose());
         let dropped: Vec<_> =
             (0..WAITING_MAX + 2).filter(|number| pictures.is_of_ended_run(*number)).collect();
         assert_eq!(dropped, [0]);

@@ -33,6 +33,11 @@ impl Line {
         self.with(|queues| !queues.to_board.is_empty())
     }
 
+    /// Drops what the board has not heard.
+    pub fn lose(&self) {
+        self.with(|queues| queues.to_board.clear());
+    }
+
     pub fn take(&self) -> Vec<u8> {
         self.with(|queues| std::mem::take(&mut queues.from_board))
     }

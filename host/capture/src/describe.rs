@@ -11,9 +11,10 @@ use farnear_protocol::{
 pub use alarm::{alarm_text, failure_text};
 pub use refusal::refusal_text;
 
-/// Remedy for a camera that is slower than the board expects.
+/// Remedies for a camera that is slower than the board expects.
 const SLOW_READOUT: &str = "if the first exposure succeeds and later ones fail, the camera reads out for longer than \
-                            camera_readout_us: `farnear rig settings set camera_readout_us ...`";
+                            camera_readout_us: `farnear rig settings set camera_readout_us ...`; a trigger delay must be shorter \
+                            than strobe_deadline_us";
 
 pub fn um(position: Nanometres) -> f64 {
     f64::from(position.0) / 1000.0

@@ -158,7 +158,9 @@ pub enum ClientError {
 
 fn what_came(bad_frames: u64, bytes: u64) -> String {
     match (bad_frames, bytes) {
-        (_, 0) => "; nothing at all came: is it the right port, and is the board powered?".into(),
+        (_, 0) => "; nothing at all came: is it the right port, and is the board powered? An emulated one may be stopped (Ctrl-Z) or \
+                   its computer too busy"
+            .into(),
         (0, bytes) => format!("; {bytes} bytes came, but no frame: is it the right port?"),
         (frames, bytes) => {
             format!(

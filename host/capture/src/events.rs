@@ -61,12 +61,6 @@ pub(crate) fn is_under_way(request: u32, status: &Status) -> bool {
 /// The request of an event, and whether it ends it.
 pub(crate) fn request_of(kind: &EventKind) -> Option<(u32, bool)> {
     match *kind {
-        EventKind::Homed { request, .. }
-        | EventKind::MoveDone { request, .. }
-        | EventKind::ProgramDone { request, .. }
-        | EventKind::ContinuousDone { request, .. }
-        | EventKind::Calibrated { request, .. }
-        | EventKind::Failed { request, .. } => Some((request, true)),
         EventKind::ShotDone { request, .. }
         | EventKind::FrameTaken { request, .. }
         | EventKind::FrameDropped { request, .. }
@@ -74,9 +68,6 @@ pub(crate) fn request_of(kind: &EventKind) -> Option<(u32, bool)> {
         | EventKind::Flash { request, .. }
         | EventKind::Paused { request, .. }
         | EventKind::StillThere { request } => Some((request, false)),
-        EventKind::Started { .. }
-        | EventKind::Alarm(_)
-        | EventKind::AlarmCleared { .. }
-        | EventKind::RecordRepaired { .. } => None,
+        _ => kind.ended().map(|request| (request, true)),
     }
 }

@@ -300,6 +300,23 @@ pub fn strobe_note(record: &ShotRecord) -> Option<String> {
     })
 }
 
+/// Largest share of an exposure, as a divisor, that the board's light may miss without a message.
+const UNLIT: u64 = 20;
+
+/// A message if the board's light, which is on during the trigger pulse, missed more than a twentieth of the exposure.
+pub fn unlit_note(record: &ShotRecord) -> Option<String> {
+    let pulse_end = record.trigger.0.saturating_add(u64::from(record.exposure.0));
+    let strobe_us = record.strobe_end.0.saturating_sub(record.strobe_start.0);
+    let unlit_us = record.strobe_end.0.saturating_sub(pulse_end).min(strobe_us);
+    (unlit_us.saturating_mul(UNLIT) > strobe_us).then(|| {
+        format!(
+            "the board's light is on during the trigger pulse only, and the camera exposes later: exposure {} was dark for {unlit_us} of its \
+             {strobe_us} us; expose longer, or shorten the camera's trigger delay",
+            record.trigger_number
+        )
+    })
+}
+
 /// Sensor distance by encoders and gauge, mm.
 pub fn sensor_mm(record: &ShotRecord, limits: &Limits) -> f64 {
     sensor_distance_nm(limits.datum, |axis| record.measured(axis)) as f64 / 1e6
@@ -335,6 +352,21 @@ mod tests {
 
     use super::*;
     use crate::continuous::tests::frame;
+
+    #[test]
+    fn reports_an_exposure_that_the_light_missed() {
+        let note = |exposure_us: u32, delay_us: u64| {
+            let strobe_start = BoardMicros(1_000 + delay_us);
+            let strobe_end = BoardMicros(strobe_start.0 + u64::from(exposure_us));
+            let (trigger, exposure) = (BoardMicros(1_000), Micros(exposure_us));
+            unlit_note(&ShotRecord { trigger, strobe_start, strobe_end, exposure, ..frame(7, 0).record })
+        };
+        assert_eq!([note(400, 20), note(5_000, 20), note(1_000_000, 20_000)], [None, None, None]);
+        let half = note(40, 20).unwrap_or_default();
+        assert!(half.contains("exposure 7 was dark for 20 of its 40 us"), "{half}");
+        let dark = note(1_000, 20_000).unwrap_or_default();
+        assert!(dark.contains("for 1000 of its 1000 us"), "{dark}");
+    }
 
     #[test]
     fn reports_a_strobe_of_another_length_than_the_exposure() {

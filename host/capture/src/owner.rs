@@ -41,7 +41,7 @@ pub type Connect = Box<dyn FnMut() -> Result<Box<dyn Transport>, PortError> + Se
 const ALERT: Duration = Duration::from_millis(1);
 /// Polling interval while no event is awaited.
 const IDLE: Duration = Duration::from_millis(50);
-/// Unanswered polls in a row, each with all repeats, after which the board is dead.
+/// Unanswered polls in a row, each with all repeats, after which a real board is dead.
 const UNANSWERED_POLLS: u32 = 2;
 /// Longest read between two commands.
 const GLANCE: Duration = Duration::from_millis(1);
@@ -420,9 +420,11 @@ impl Owner {
             Ok(status) => status,
             Err(ClientError::Silent { attempts, .. }) => {
                 self.unanswered += 1;
-                if self.unanswered >= UNANSWERED_POLLS {
-                    let attempts = attempts * UNANSWERED_POLLS;
-                    self.end_session(Break::Silent { attempts, waited: begin.elapsed() });
+                // The repeats to an emulated board take longer than a disturbance of its line: it has stopped.
+                if self.unanswered >= UNANSWERED_POLLS || self.session.hello.emulated {
+                    let attempts = attempts * self.unanswered;
+                    let waited = begin.elapsed() + self.timing().poll * (self.unanswered - 1);
+                    self.end_session(Break::Silent { attempts, waited });
                 }
                 return;
             }

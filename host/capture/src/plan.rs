@@ -36,7 +36,7 @@ pub enum PlanError {
     Travel { travel_um: f64, piezo_um: f64 },
     #[error(
         "the optics ask for a sensor distance of {sensor_mm:.4} mm, the stage reaches {min_mm:.4} to {max_mm:.4} mm; \
-         check focal length, focus distances and where the lens stage stands"
+         check focal length, focus distances, the setting datum_nm and where the lens stage stands"
     )]
     Reach { sensor_mm: f64, min_mm: f64, max_mm: f64 },
     #[error(
@@ -150,8 +150,15 @@ pub(crate) mod tests {
     fn rejects_unreachable_distances() {
         let wide = SensorPair { far_mm: 52.0, near_mm: 52.2 };
         assert!(matches!(coarse_for(&wide, BASE, &limits()), Err(PlanError::Travel { .. })));
-        let long = SensorPair { far_mm: 75.0, near_mm: 75.1 };
-        assert!(matches!(coarse_for(&long, BASE, &limits()), Err(PlanError::Reach { .. })));
+        // Far lenses, and one of 8 mm with the datum of another.
+        for far_mm in [75.0, 8.2051] {
+            let pair = SensorPair { far_mm, near_mm: far_mm + 0.1 };
+            let error = coarse_for(&pair, BASE, &limits()).unwrap_err();
+            assert!(
+                matches!(error, PlanError::Reach { .. }) && error.to_string().contains("datum_nm"),
+                "{error}"
+            );
+        }
         let off = fine_for(52.0, BASE, Nanometres(6_000_000), &limits()).unwrap_err();
         assert!(off.to_string().contains("-1000.000 um"), "{off}");
     }

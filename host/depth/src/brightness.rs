@@ -1,10 +1,14 @@
 //! Flicker of lamp or exposure: the brightness of whole frames of a stack. Defocus keeps the mean of a region, so a factor
 //! that is common to all blocks of a frame is not of the scene. Sharpness grows with it, and a bright frame attracts depths.
 
+mod trend;
+
 use std::borrow::Cow;
 use std::ops::Range;
 
 use ndarray::{Array2, ArrayView2, s};
+
+pub use trend::Trend;
 
 const BLOCKS: usize = 6;
 /// Least deviation from 1 of a factor that counts, and in multiples of its median deviation among the blocks.

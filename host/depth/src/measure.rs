@@ -18,7 +18,9 @@ use crate::median::median;
 use crate::mosaic::is_mosaic;
 use crate::operators::{DesignError, Operators};
 use crate::optics::{Optics, Stage};
-use crate::pipeline::{RunError, Settings, depth_from_pair, extend_border, fill_border, warnings_after};
+use crate::pipeline::{
+    RunError, Settings, depth_from_pair, extend_border, fill_border, warnings_after, widen_border,
+};
 use crate::prepare::{
     CameraFrames, PrepareError, PrepareSettings, Prepared, Registration, Report, prepare_after,
     usual_magnitude,
@@ -226,7 +228,11 @@ pub(crate) fn measure_after(
     let mut findings = findings(&map, &prepared, &estimate, optics);
     findings.extend(is_mosaic.then_some(Finding::Mosaic));
     let judging = ValiditySettings { least_confidence: settings.least_confidence, filled: settings.run.fill };
-    let validity = assess(&mut map, &prepared, estimate, optics, &judging);
+    let mut validity = assess(&mut map, &prepared, estimate, optics, &judging);
+    // The deviations of other methods do not explain how their neighbours differ.
+    if matches!(method, DepthMethod::Whitened) {
+        widen_border(&mut validity.deviation_mm, &map.depth_mm, white.reach_px() + 1);
+    }
     // The loss that the caller asked for is news only if nothing is left.
     let reported = |lost: &&Lost| {
         lost.fraction > LEAST_REPORTED && (lost.reason != Reason::Unsure || validity.valid_fraction == 0.0)
@@ -257,7 +263,7 @@ pub(crate) fn measure(
     let mut of_windows = WindowSettings {
         window: settings.window,
         median_px: settings.run.median_px,
-        noise: prepared.noise,
+        noise: prepared.balanced_noise(),
         backend: settings.run.backend,
     };
     // Part of the pair's noise that the estimate is given.

@@ -23,6 +23,11 @@ pub use error::OpticsError;
 pub use file::{FocusSection, LensSection, LightSection, OpticsFile, SensorSection};
 pub use stage::{Coarser, RESPONSE_POINTS, Stage, unexplained};
 
+/// A column or row, whose pixel's centre is an integer, in images with `bin` x `bin` pixels averaged into one; with `1 / bin` the way back.
+pub fn binned_place(place: f64, bin: f64) -> f64 {
+    (place + 0.5) / bin - 0.5
+}
+
 /// Image distance of an object at `object_mm`; the thin lens is its own inverse, so this also maps back.
 fn image_mm(focal_length_mm: f64, object_mm: f64) -> f64 {
     focal_length_mm + focal_length_mm * focal_length_mm / (object_mm - focal_length_mm)

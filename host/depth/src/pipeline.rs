@@ -27,7 +27,7 @@ use crate::optics::Optics;
 pub use crate::cubic::MAX_ALPHA;
 pub use crate::depth_map::{DepthMap, SwapEvidence, Warning};
 pub use crate::simd::Backend;
-pub(crate) use border_fill::{extend as extend_border, fill as fill_border};
+pub(crate) use border_fill::{extend as extend_border, fill as fill_border, widen as widen_border};
 pub(crate) use check::{after as warnings_after, check, check_windows};
 pub use processor::Processor;
 

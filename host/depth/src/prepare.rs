@@ -45,6 +45,7 @@ pub(crate) use defects::usual_magnitude;
 pub(crate) use registration::Registration;
 
 pub use camera::{CameraError, CameraFrames, check_saturation};
+pub use defects::erase_wild;
 pub use mismatch::Mismatch;
 pub use straight::straightened;
 
@@ -218,6 +219,13 @@ pub struct Report {
     pub looks_not_telecentric: bool,
 }
 
+impl Report {
+    /// Factor of balancing on the noise's variance: a near image darker than the far one was amplified.
+    fn noise_gain(&self) -> f64 {
+        self.balanced.map_or(1.0, |balanced| balanced.gain.min(1.0).powi(-2))
+    }
+}
+
 fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
@@ -235,6 +243,13 @@ pub struct Prepared {
     pub noise: PairNoise,
     /// Report of the preparation.
     pub report: Report,
+}
+
+impl Prepared {
+    /// The noise of the images as they are here, after balancing.
+    pub(crate) fn balanced_noise(&self) -> PairNoise {
+        self.noise.scaled(self.report.noise_gain())
+    }
 }
 
 /// Makes the images `[far, near]`, (height, width), of any common scale, ready for depth. Nothing is copied that need not be,
@@ -359,7 +374,7 @@ fn finish(
     if marked {
         report.saturated_fraction = part_of(&reasons, Reason::Saturated);
     }
-    let agreement = agreement::compare(&thinned, size, &noise);
+    let agreement = agreement::compare(&thinned, size, &noise.scaled(report.noise_gain()));
     drop(thinned);
     report.equally_sharp = agreement.equally_sharp;
     (report.correlation, report.detailed_fraction) = (agreement.correlation, agreement.detailed);

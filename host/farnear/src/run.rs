@@ -13,7 +13,6 @@ use crate::{
 };
 
 // A task. Not a doc comment on these three: the help text of a command is that of its request.
-#[allow(missing_docs)]
 #[derive(Args)]
 pub struct Run<R: Request + Args> {
     #[command(flatten)]
@@ -40,7 +39,6 @@ impl<R: Request + Args> Run<R> {
 }
 
 // A task of a rig.
-#[allow(missing_docs)]
 #[derive(Args)]
 pub struct RigRun<R: RigRequest + Args> {
     #[command(flatten)]
@@ -59,7 +57,6 @@ impl<R: RigRequest + Args> RigRun<R> {
 }
 
 // A task of a rig with a camera.
-#[allow(missing_docs)]
 #[derive(Args)]
 pub struct CameraRun<R: CameraRequest + Args> {
     #[command(flatten)]

@@ -12,7 +12,7 @@ use std::{
 };
 
 use crate::image_file::metadata::taken;
-use name::{Name, last_varying};
+use name::{Name, counting};
 use reading::read;
 
 pub use reading::{ambiguity, same_number};
@@ -47,7 +47,7 @@ pub fn counter_started_again(sorted: &[PathBuf]) -> Option<[&PathBuf; 2]> {
 /// again leaves none.
 pub fn gap(sorted: &[PathBuf]) -> Option<[&PathBuf; 2]> {
     let (names, _) = read(sorted);
-    let column = last_varying(&names)?;
+    let column = counting(&names)?;
     let numbers: Vec<f64> = names.iter().map(|name| name.numbers[column].value()).collect::<Option<_>>()?;
     let steps: Vec<f64> = numbers.windows(2).map(|two| (two[1] - two[0]).abs()).collect();
     let mut in_order = steps.clone();
@@ -61,10 +61,11 @@ pub fn gap(sorted: &[PathBuf]) -> Option<[&PathBuf; 2]> {
     apart.by_ref().map(|(two, _)| two).find(is_gap).map(|two| [&two[0], &two[1]])
 }
 
-/// The numbers that count files: the last that varies between names of one pattern, else the last of each name.
+/// The numbers that count files: of names of one pattern that of the focus (behind `z`, or before a unit of length), else the last that
+/// varies; of other names the last.
 pub fn numbers(paths: &[PathBuf]) -> Vec<Option<f64>> {
     let (names, _) = read(paths);
-    let column = last_varying(&names);
+    let column = counting(&names);
     let number = |name: &Name| match column {
         Some(column) => name.numbers[column].value(),
         None => name.numbers.last()?.value(),
@@ -250,6 +251,26 @@ mod tests {
             let paths: Vec<PathBuf> = names.iter().map(PathBuf::from).collect();
             assert_eq!(counter_started_again(&paths), None);
         }
+    }
+
+    #[test]
+    fn a_time_next_to_the_focus_does_not_count() {
+        for names in [
+            &["z001_t12-50.png", "z002_t12-05.png", "z003_t12-40.png", "z004_t12-20.png"][..],
+            &["z-4_t12-05.png", "z-3_t12-22.png", "z0_t12-39.png", "z10_t12-13.png"],
+            &["z0mm_05.png", "z0.25mm_22.png", "z0.5mm_39.png", "z1mm_13.png"],
+            &["t3_Z1.png", "t1_Z2.png", "t4_Z3.png", "t2_Z10.png"],
+            &["50um_9s.png", "100um_3s.png", "150um_7s.png", "200um_5s.png"],
+        ] {
+            let reversed: Vec<&str> = names.iter().rev().copied().collect();
+            assert_eq!(sorted(&reversed), names);
+            let paths: Vec<PathBuf> = names.iter().map(PathBuf::from).collect();
+            assert_eq!(counter_started_again(&paths), None);
+        }
+        let minutes = ["z1_t12-05", "z2_t12-10", "z3_t12-15", "z4_t12-20", "z5_t12-50"].map(PathBuf::from);
+        assert_eq!(gap(&minutes), None);
+        let wavelengths = ["405nm_1.png", "488nm_2.png", "561nm_3.png"].map(PathBuf::from);
+        assert_eq!(numbers(&wavelengths), [Some(1.0), Some(2.0), Some(3.0)]);
     }
 
     #[test]

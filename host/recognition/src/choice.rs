@@ -14,7 +14,6 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
-/// Combination of views.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Views {
@@ -53,7 +52,6 @@ pub struct Chosen {
     pub space: Space,
     /// Sharpness of soft assignments.
     pub sharpness: f32,
-    /// Classifier with its parameter.
     pub classifier: ClassifierKind,
     /// Inner accuracy, 0 to 1; `None` without alternatives.
     pub inner_accuracy: Option<f64>,

@@ -15,7 +15,6 @@ use ndarray::{Array2, ArrayView2};
 
 /// Why an embedding failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "the messages name the fields")]
 pub enum EmbeddingError {
     #[error("stopped before the embedding was made")]
     Stopped,

@@ -11,7 +11,6 @@ use std::sync::Arc;
 
 /// A parameter of the space with its candidate values.
 #[derive(Clone, Debug, PartialEq)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum Sweep {
     /// Layout of the gallery with its dimensions.
     Layout(Vec<(Layout, usize)>),

@@ -58,8 +58,6 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-#![deny(missing_docs)]
-
 pub mod alignment;
 pub mod auxiliary_model;
 pub mod choice;

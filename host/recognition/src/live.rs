@@ -88,7 +88,6 @@ impl<'a> Live<'a> {
     }
 }
 
-/// Concatenates tracks.
 pub fn joined<'t>(parts: impl Iterator<Item = &'t Track>) -> Track {
     let parts: Vec<&Track> = parts.collect();
     let empty_frames = parts.iter().map(|part| part.empty_frames).sum();

@@ -14,9 +14,7 @@ use crate::embedding::{EmbeddingError, descriptor::Scaling, squared_distance};
 use ndarray::{Array1, Array2, ArrayView1};
 use serde::{Deserialize, Serialize};
 
-/// Settings of a recogniser.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct RecogniserSettings {
     pub scaling: Scaling,
     pub space: SpaceSettings,
@@ -38,9 +36,7 @@ impl Default for RecogniserSettings {
     }
 }
 
-/// A trained recogniser.
 #[derive(Clone, Debug, PartialEq)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Recogniser {
     pub settings: RecogniserSettings,
     /// Activities by class index.
@@ -133,7 +129,6 @@ fn most_probable(probabilities: &[(String, f32)]) -> Option<&(String, f32)> {
 
 /// Why a model could not be made, read or used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "the messages name the fields")]
 pub enum ModelError {
     #[error("not a farnear activity model: {0}")]
     NotAModel(&'static str),

@@ -46,7 +46,6 @@ pub enum PatternKind {
 /// [`Self::thesis`] uses Isomap. Report accuracies of settings chosen on other subjects
 /// ([`super::experiment::Experiment::searched`]), not for these defaults.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct SpaceSettings {
     pub layout: Layout,
     pub dimensions: usize,
@@ -80,6 +79,12 @@ impl Default for SpaceSettings {
 }
 
 impl SpaceSettings {
+    /// For few short clips.
+    #[cfg(test)]
+    pub(crate) fn small() -> Self {
+        Self { dimensions: 4, pattern: PatternKind::Codebook(8), residuals: 0, ..Self::default() }
+    }
+
     /// Settings of the thesis: three dimensions, 15 x 9 x 9 cells.
     pub fn thesis() -> Self {
         Self {
@@ -93,7 +98,6 @@ impl SpaceSettings {
 
 /// Embedding of new silhouettes.
 #[derive(Clone, Debug, PartialEq)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum Map {
     Rbf(Rbf),
     Pca(Pca),
@@ -101,7 +105,6 @@ pub enum Map {
 
 /// Patterns of embedded clips. Model files number them in this order: append new ones.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum Pattern {
     Thesis(OccupancyGrid),
     Codebook(Codebook),
@@ -112,7 +115,6 @@ pub enum Pattern {
 
 /// The learned space of frames and patterns.
 #[derive(Clone, Debug, PartialEq)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Space {
     pub settings: SpaceSettings,
     pub map: Map,
@@ -169,7 +171,6 @@ impl Space {
         Ok(Self { pattern: Pattern::Features(Box::new(features)), ..self.clone() })
     }
 
-    /// Pattern of frame vectors.
     pub fn pattern_of(&self, vectors: ArrayView2<f32>, sharpness: f32) -> Array1<f32> {
         match &self.pattern {
             Pattern::Thesis(grid) => grid.pattern(vectors),

@@ -152,7 +152,7 @@ mod tests {
     use super::*;
     use crate::clip::Track;
     use crate::embedding::descriptor::{ANGLES, CELLS};
-    use crate::space::{PatternKind, SpaceSettings};
+    use crate::space::SpaceSettings;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -179,13 +179,7 @@ mod tests {
     }
 
     fn distances(clips: &[Clip], performances: &[usize]) -> Vec<f32> {
-        let space = SpaceSettings {
-            dimensions: 4,
-            pattern: PatternKind::Codebook(8),
-            residuals: 0,
-            ..SpaceSettings::default()
-        };
-        let experiment = Experiment::codebook(space).fixed();
+        let experiment = Experiment::codebook(SpaceSettings::small()).fixed();
         let scaling = Scaling::default();
         let trained = Recogniser::train_performances(clips, performances, &experiment, scaling, &Unwatched);
         trained.expect("trained").0.limits.distances
@@ -203,13 +197,7 @@ mod tests {
     #[test]
     fn a_model_tells_the_clips_that_it_has_learned() {
         let (clips, _) = copies(6, 1);
-        let space = SpaceSettings {
-            dimensions: 4,
-            pattern: PatternKind::Codebook(8),
-            residuals: 0,
-            ..SpaceSettings::default()
-        };
-        let settings = RecogniserSettings { space, ..RecogniserSettings::default() };
+        let settings = RecogniserSettings { space: SpaceSettings::small(), ..RecogniserSettings::default() };
         let model = Recogniser::train(&clips[..4], &settings).expect("trained");
         let learned: Vec<bool> =
             clips.iter().map(|clip| model.has_learned(&clip.views).expect("fits")).collect();

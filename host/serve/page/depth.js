@@ -1,6 +1,6 @@
 // Depth of a capture: map, confidence, deviation, images, surface; probe, profile, region; two layers compared by a wipe.
 import { act, bytes, ended, get, on, onJob, store } from "./link.js";
-import { h, altered, button, choice, field, number, optional, panel, notice } from "./ui.js";
+import { h, altered, button, choice, field, number, optional, panel, notice, say } from "./ui.js";
 import { Viewer } from "./viewer.js";
 import { bars } from "./plot.js";
 import { NAMES, bar, paint, range } from "./maps.js";
@@ -13,6 +13,7 @@ const FILES = { depth: "depth.npy", confidence: "confidence.npy", deviation: "un
 const UNITS = { depth: "mm", confidence: "", deviation: "mm", difference: "mm", far: "", near: "", reason: "", sharp: "" };
 const METHODS = [["whitened", "Whitened (noise limit)"], ["ro", "Rational operators"], ["favaro", "Favaro & Soatto"], ["subbarao", "Subbarao, spatial"], ["subbarao-fourier", "Subbarao, Fourier"]];
 
+const NOTHING = "No depth yet. Capture a pair in Live, or compute one here.";
 /** Folder of what is computed from a stack, within its capture. */
 const STACK = "focus-stack";
 const GREY = ["far", "near", "sharp"];
@@ -40,7 +41,7 @@ export function make(host, remember) {
   /** Ends of the colours that were typed. @returns {[number, number] | null} */
   const manual = () => (!altered(least) && !altered(most) && least.value !== "" && most.value !== "" && Number(least.value) < Number(most.value) ? [Number(least.value), Number(most.value)] : null);
   const histogram = h("canvas", { class: "histogram", role: "img", "aria-label": "distribution of the values" });
-  const empty = h("p", { class: "empty" }, "No depth yet. Capture a pair in Live, or compute one here.");
+  const empty = h("p", { class: "empty" }, NOTHING);
   const other = h("select", { "aria-label": "Compare with", onchange: (event) => { show.other = event.target.value; refresh(); } });
   const wipe = h("input", { type: "range", min: 0, max: 100, value: 50, "aria-label": "Wipe", oninput: () => { viewer.wipe = wipe.value / 100; viewer.draw(); } });
   const against = h("div", {});
@@ -63,7 +64,10 @@ export function make(host, remember) {
       panel("Compare", field("With", other), field("Wipe", wipe), against), settings, stacking,
       panel("Files", links(() => show.name)))));
 
-  viewer.onprobe = (at) => side.under(show.maps, at, viewer.source);
+  viewer.onprobe = (at, keyed) => {
+    const words = side.under(show.maps, at, viewer.source);
+    if (at && keyed) say(`${words}, pixel ${at.join(", ")}`);
+  };
   viewer.overlay = (context, point) => {
     const picture = viewer.source;
     const middle = show.maps.depth ? range(show.maps.depth, 0.5)[0] : show.capture?.optics?.focus?.far_mm;
@@ -223,6 +227,7 @@ export function make(host, remember) {
     const { layer, maps } = show;
     const painting = ++show.painting;
     empty.hidden = Boolean(maps.far || maps.depth);
+    empty.textContent = show.name && show.of !== show.name ? `Loading ${show.name} …` : NOTHING;
     for (const control of layers.children) {
       control.setAttribute("aria-pressed", control.dataset.layer === layer);
       control.hidden = (show.capture && show.capture.kind !== "pair" ? OF_PAIRS : OF_STACKS).includes(control.dataset.layer);

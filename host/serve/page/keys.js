@@ -41,8 +41,9 @@ export function listen() {
       stop();
       return;
     }
-    const typing = event.target instanceof Element && event.target.matches("input, textarea, select, [contenteditable], dialog *, [role=application]");
-    if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
+    const typing = event.target instanceof Element && event.target.matches("input, textarea, select, [contenteditable], dialog, dialog *, [role=application]");
+    // A key that is held down acts once: the page would flash, or the rig get a request for each repetition.
+    if (typing || event.repeat || event.ctrlKey || event.metaKey || event.altKey) return;
     const found = keys.get(event.key) ?? keys.get(event.key.toLowerCase());
     if (found) {
       event.preventDefault();

@@ -1,5 +1,5 @@
 // The way to the rig's program: one socket that tells, and requests that ask. Everything the page does goes through here.
-import { notice } from "./ui.js";
+import { kept, notice } from "./ui.js";
 
 /**
  * The last state received, and this client.
@@ -17,10 +17,10 @@ let server = "";
 /** Where the secret of this page survives a reload. */
 const SECRET = "farnear-client";
 /** The secret is stored only while the page is loaded again: a duplicated tab gets a copy of the storage, and would take control. */
-let secret = sessionStorage.getItem(SECRET);
-sessionStorage.removeItem(SECRET);
-addEventListener("pagehide", () => secret && sessionStorage.setItem(SECRET, secret));
-addEventListener("pageshow", () => sessionStorage.removeItem(SECRET));
+let secret = kept("sessionStorage", SECRET);
+kept("sessionStorage", SECRET, null);
+addEventListener("pagehide", () => secret && kept("sessionStorage", SECRET, secret));
+addEventListener("pageshow", () => kept("sessionStorage", SECRET, null));
 /** Seconds without a message after which the connection is lost. The server sends one every two seconds. */
 const QUIET = 8;
 let quiet = 0;

@@ -1,6 +1,6 @@
 // The live image with what one focuses by: histogram, saturation, peaking, focus value; and live depth.
 import { act, hasControl, ended, get, on, onJob, store } from "./link.js";
-import { h, button, choice, field, keep, notice, number, numeric, panel, rows } from "./ui.js";
+import { h, button, choice, field, keep, notice, number, numeric, panel, rows, say, write } from "./ui.js";
 import { Viewer } from "./viewer.js";
 import { Plot, bars } from "./plot.js";
 import { bar, paintCodes } from "./maps.js";
@@ -31,7 +31,7 @@ export function make(host) {
     press();
   }, { "aria-pressed": "false", title: "Drag a rectangle in the image: focus value, histogram, Auto and Find focus use it alone" });
   const press = () => region.setAttribute("aria-pressed", String(image.tool === "region" || Boolean(store.state?.live.region)));
-  const focus = h("output", { class: "big" }, "–");
+  const focus = h("output", { class: "big", "aria-live": "off" }, "–");
   const histogram = h("canvas", { class: "histogram", role: "img", "aria-label": "histogram of brightness" });
   const figures = h("div", {});
   const warnings = h("ul", { class: "warnings", "aria-live": "polite" });
@@ -39,7 +39,7 @@ export function make(host) {
   const place = h("div", {});
   const plot = new Plot(place, { label: "focus value over the last frames", height: 110, names: ["focus"] });
   const resting = h("p", { class: "empty", hidden: true }, "The live image is off: L begins it.");
-  const [least, most, probe] = [h("span", {}), h("span", {}), h("output", { "aria-label": "Depth under the pointer" })];
+  const [least, most, probe] = [h("span", {}), h("span", {}), h("output", { "aria-label": "Depth under the pointer", "aria-live": "off" })];
   const colours = h("canvas", { class: "legend-bar", role: "img", "aria-label": "colours of live depth" });
   const scale = h("div", { class: "legend", hidden: true }, least, colours, most, probe);
   /** The last live map. @type {{ codes: Uint16Array, width: number, low_mm: number, high_mm: number } | null} */
@@ -59,16 +59,19 @@ export function make(host) {
     // The image is held while the rig works.
     if (running) pictured = performance.now();
     const unhomed = rig.phase === "ready" && [rig.info?.coarse, rig.info?.lens].some((stage) => stage && stage.state === "unknown");
-    const silent = live.mode !== "off" && !running && rig.phase !== "connecting" && (rig.phase === "ready" || live.camera_alone) && performance.now() - pictured > 3000;
-    const what = running ? ["job", job.title, job.said] : live.error ? ["error", live.error] : silent ? ["silent", Math.floor((performance.now() - pictured) / 1000)] : unhomed ? ["unhomed"] : null;
+    // In steps of ten seconds: a screen reader reads each change.
+    const quiet = (performance.now() - pictured) / 1000;
+    const silent = live.mode !== "off" && !running && rig.phase !== "connecting" && (rig.phase === "ready" || live.camera_alone) && quiet > 3;
+    const what = running ? ["job", job.title, job.said] : live.error ? ["error", live.error] : silent ? ["silent", quiet < 10 ? 3 : 10 * Math.floor(quiet / 10)] : unhomed ? ["unhomed"] : null;
     lead.hidden = !what;
+    lead.setAttribute("aria-live", running ? "off" : "polite");
     image.element.style.opacity = what?.[0] === "silent" || what?.[0] === "error" ? "0.35" : "";
     keep(lead, [what, hasControl()], () => {
       if (!what) return [];
       const retry = button("Try again", () => act("/api/live", { mode: "image" }), { disabled: !hasControl() });
       if (what[0] === "job") return [h("strong", {}, String(what[1])), h("span", {}, String(what[2] ?? "starting"))];
       if (what[0] === "error") return [h("span", {}, `No image: ${live.error}`), retry];
-      if (what[0] === "silent") return [h("span", {}, `No image for ${what[1]} s. Check the camera.`), retry];
+      if (what[0] === "silent") return [h("span", {}, `No image for more than ${what[1]} s. Check the camera.`), retry];
       return [h("span", {}, "Stages are not homed: the image is out of focus."), button("Home and focus", homeAndFocus, { class: "primary", disabled: !hasControl() })];
     });
   };
@@ -155,10 +158,12 @@ export function make(host) {
     image.use("pan");
     act("/api/live", { region: [Math.min(x0, x1), Math.min(y0, y1), Math.abs(x1 - x0) + 1, Math.abs(y1 - y0) + 1] });
   };
+  image.onprobe = (at, keyed) => at && keyed && say(`pixel ${at.join(", ")}`);
   depth.element.hidden = true;
-  depth.onprobe = (at) => {
+  depth.onprobe = (at, keyed) => {
     const code = at && live ? live.codes[at[1] * live.width + at[0]] : 0;
     probe.textContent = at ? (code && live ? number(live.low_mm + ((code - 1) * (live.high_mm - live.low_mm)) / 65534, 2, "mm") : "no depth") : "";
+    if (at && keyed) say(`${probe.textContent}, pixel ${at.join(", ")}`);
   };
   /** Nothing of the mode before is shown as if it were new. */
   const forgetShown = (mode) => {
@@ -170,7 +175,7 @@ export function make(host) {
     plot.set([[], []]);
     bars(histogram, []);
     figures.replaceChildren(mode === "depth" ? h("p", { class: "dim" }, "Live depth has no focus value and no histogram.") : "");
-    warnings.replaceChildren();
+    keep(warnings, [], () => []);
     write(status, { image: "waiting for the first image", depth: "waiting for the first map" }[mode] ?? "live is off");
   };
   key("l", "Live image on or off", () => mode("image"));
@@ -241,7 +246,7 @@ export function make(host) {
     plot.set([values.map((_, at) => at - values.length + 1), values]);
     bars(histogram, found.histogram, (at) => at === 255);
     figures.replaceChildren(rows([["mean", `${number(100 * found.mean, 1)} %`], ["saturated", `${number(100 * found.saturated_fraction, 2)} %`], ["contrast", number(found.contrast, 3)]]));
-    warnings.replaceChildren(...found.warnings.map((text) => h("li", {}, text)));
+    keep(warnings, found.warnings, () => found.warnings.map((text) => h("li", {}, text)));
     capture.warn(found.warnings);
   });
 
@@ -270,11 +275,6 @@ function brightest(histogram) {
   let code = histogram.length - 1;
   while (code > 0 && (above -= histogram[code]) > 0) code -= 1;
   return code;
-}
-
-/** Words that are there already cost nothing. @param {HTMLElement} place @param {string} text */
-function write(place, text) {
-  if (place.textContent !== text) place.textContent = text;
 }
 
 function check(text, checked) {

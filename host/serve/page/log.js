@@ -1,6 +1,6 @@
 // Messages, and the alarms in the board's memory, each with its remedy.
 import { act, hasControl, get, on, store } from "./link.js";
-import { h, button, number, panel } from "./ui.js";
+import { h, button, number, panel, when } from "./ui.js";
 
 /** Makes the view. */
 export function make(host) {
@@ -12,7 +12,7 @@ export function make(host) {
   async function refresh() {
     const end = lines.scrollTop + lines.clientHeight > lines.scrollHeight - 40;
     const { lines: all } = await get("/api/log");
-    lines.textContent = all.map(({ unix_ms, text }) => `${new Date(unix_ms).toLocaleTimeString()}  ${text}`).join("\n");
+    lines.textContent = all.map(({ unix_ms, text }) => `${when(unix_ms)}  ${text}`).join("\n");
     if (end) lines.scrollTop = lines.scrollHeight;
   }
   async function read() {

@@ -1,6 +1,6 @@
 // The page: views, connection to the rig, control, alarms, running jobs.
 import { act, hasControl, on, open, stop, store } from "./link.js";
-import { h, ask, button, dropErrors, keep, notice } from "./ui.js";
+import { h, ask, button, dropErrors, keep, kept, notice, refocus, say, write } from "./ui.js";
 import { help, key, listen } from "./keys.js";
 import * as rig from "./rig.js";
 import * as live from "./live.js";
@@ -18,7 +18,7 @@ const views = new Map();
 let current = null;
 
 function theme(next) {
-  const wanted = next ?? localStorage.getItem("farnear-theme") ?? "";
+  const wanted = next ?? kept("localStorage", "farnear-theme") ?? "";
   if (wanted) document.documentElement.dataset.theme = wanted;
   else delete document.documentElement.dataset.theme;
 }
@@ -26,7 +26,7 @@ function theme(next) {
 function turnTheme() {
   const dark = document.documentElement.dataset.theme ? document.documentElement.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
   const next = dark ? "light" : "dark";
-  localStorage.setItem("farnear-theme", next);
+  kept("localStorage", "farnear-theme", next);
   theme(next);
   dispatchEvent(new Event("restyle"));
 }
@@ -44,12 +44,15 @@ function addView(name, title, make) {
 /** Shows a view; the address remembers it, with the capture that is open. */
 function go(name, detail, back = false) {
   const view = views.get(name) ?? views.get("live");
+  const within = $("view").contains(document.activeElement);
   for (const [other, { host, tab }] of views) {
     host.hidden = views.get(other) !== view;
     tab.setAttribute("aria-selected", !host.hidden);
     tab.tabIndex = host.hidden ? -1 : 0;
     if (!host.hidden) current = other;
   }
+  if (within && document.activeElement?.closest("[hidden]")) refocus();
+  document.title = `${view.tab.textContent} – farnear`;
   // A small screen does not show all tabs.
   const { tab } = view;
   if (tab.parentElement.scrollWidth > tab.parentElement.clientWidth) tab.parentElement.scrollLeft = tab.offsetLeft - tab.parentElement.offsetLeft - 40;
@@ -82,7 +85,7 @@ function showLink() {
   const phase = !store.connected ? "lost" : store.state?.rig.phase ?? "connecting";
   link.dataset.phase = phase;
   const words = { ready: "connected", connecting: "connecting", lost: store.connected ? "rig lost" : "no connection", absent: "no rig" };
-  link.textContent = words[phase];
+  write(link, words[phase]);
 }
 
 function showControl(state) {
@@ -156,7 +159,11 @@ function showJob(state, before) {
     if (total) bar.value = done / total;
     else bar.removeAttribute("value");
   });
-  for (const queue of ["job", "computation"]) ended(state[queue], before?.[queue], !before);
+  for (const queue of ["job", "computation"]) {
+    const job = state[queue];
+    if (before && job?.phase === "running" && before[queue]?.id !== job.id) say(`${job.title} has begun`);
+    ended(job, before?.[queue], !before);
+  }
 }
 
 /** Warnings of the last job stay until they are closed or the next job ends. */
@@ -177,6 +184,7 @@ function ended(job, before, fresh) {
   seen.set(job.kind, job.id);
   if (fresh) return; // ended before this page was opened
   dropErrors(job.kind);
+  if (job.phase === "done") say(`${job.title}: done`);
   if (job.phase === "failed") notice(`${job.title}: ${job.error}`, "error", job.hint, job.kind);
   else if (job.phase === "stopped") notice(`${job.title}: stopped${/cancel|stopp/i.test(job.error ?? "") ? "" : ` (${job.error})`}`);
   else if (job.warnings.length) showWarnings(job);

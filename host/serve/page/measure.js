@@ -21,6 +21,9 @@ export function make() {
   profile.hidden = true;
   area.hidden = true;
 
+  /** Answers are awaited one after the other: each is that of the shape drawn last. */
+  let waiting = Promise.resolve(null);
+  const asking = (path, body) => (waiting = waiting.then(() => act(path, body)));
   /** Grows with every change of the maps: answers about those before are dropped. */
   let changes = 0;
   /** Removes the figures: other maps are shown. */
@@ -30,7 +33,7 @@ export function make() {
     profile.hidden = area.hidden = true;
   };
 
-  /** Under the pointer. `maps` by name; `at` is [column, row] of the picture, or null.
+  /** Under the pointer; gives the depth in words. `maps` by name; `at` is [column, row] of the picture, or null.
    * @param {any} maps @param {number[] | null} at @param {{ width: number, height: number }} [picture] */
   const under = (maps, at, picture) => {
     const value = (name) => {
@@ -39,15 +42,18 @@ export function make() {
       const [column, row] = pixelOf(map, at, picture);
       return map.data[row * map.width + column];
     };
-    probe.replaceChildren(h("output", { class: "big" }, number(value("depth"), 2, "mm")),
+    const depth = number(value("depth"), 2, "mm");
+    // A screen reader is told by the keys alone: a pointer would flood it.
+    probe.replaceChildren(h("output", { class: "big", "aria-live": "off" }, depth),
       rows([["pixel", at ? `${at[0]}, ${at[1]}` : "–"], ["± deviation", number(value("deviation"), 2, "mm")], ["confidence", number(value("confidence"), 2)], maps.reason && ["no depth because", value("reason") ? REASONS[value("reason")] : "–"]]));
+    return Number.isFinite(value("depth")) ? depth : `no depth${value("reason") ? `, ${REASONS[value("reason")]}` : ""}`;
   };
 
   /** Of a shape that was drawn. */
   const shape = async (capture, kind, from, to) => {
     const asked = changes;
     if (kind === "line") {
-      const found = await act(`/api/captures/${encodeURIComponent(capture)}/profile`, { from, to });
+      const found = await asking(`/api/captures/${encodeURIComponent(capture)}/profile`, { from, to });
       if (!found || asked !== changes) return;
       points = found.figures.points;
       profile.hidden = false;
@@ -57,7 +63,7 @@ export function make() {
       return;
     }
     const [x, y] = [Math.min(from[0], to[0]), Math.min(from[1], to[1])];
-    const found = await act(`/api/captures/${encodeURIComponent(capture)}/region`, { x, y, width: Math.abs(to[0] - from[0]) + 1, height: Math.abs(to[1] - from[1]) + 1 });
+    const found = await asking(`/api/captures/${encodeURIComponent(capture)}/region`, { x, y, width: Math.abs(to[0] - from[0]) + 1, height: Math.abs(to[1] - from[1]) + 1 });
     if (!found || asked !== changes) return;
     area.hidden = false;
     [earlier, last] = [last?.capture === capture ? last : null, { capture, ...found.figures }];

@@ -162,7 +162,7 @@ export function shadow() {
       const found = await call("POST", "/api/people/sun", sunlight());
       const { elevation_deg, azimuth_deg } = found.figures;
       picture.replaceChildren(draw.sun(elevation_deg, found.direction_deg, found.length_per_height ?? NaN));
-      facts.replaceChildren(rows([["sun above the horizon", `${number(elevation_deg, 2)}°`], ["sun from north", `${number(azimuth_deg, 2)}°`],
+      facts.replaceChildren(rows([["time in UTC", sunlight().time.slice(0, 16).replace("T", " ")], ["sun above the horizon", `${number(elevation_deg, 2)}°`], ["sun from north", `${number(azimuth_deg, 2)}°`],
         ["shadow falls to", `${number(found.direction_deg, 1)}°`], ["shadow's length", found.length_per_height == null ? "no shadow" : `${number(found.length_per_height, 2)} × height`]]));
     } catch (error) {
       facts.replaceChildren(h("p", { class: "bad" }, error.message));

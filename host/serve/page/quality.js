@@ -1,6 +1,6 @@
 // How good depth is, as owners of depth cameras ask: fill rate, plane fit, noise over time, accuracy against a known distance.
 import { act, get, on, onJob, store } from "./link.js";
-import { h, button, field, number, numeric, optional, panel, notice } from "./ui.js";
+import { h, button, field, number, numeric, optional, panel, notice, when } from "./ui.js";
 
 /** Makes the view. */
 export function make(host) {
@@ -38,7 +38,7 @@ export function make(host) {
       const list = (await get("/api/quality")).records;
       const cell = (value) => h("td", {}, value);
       records.replaceChildren(h("table", {}, h("thead", {}, h("tr", {}, ["when", "pairs", "mean", "fill rate", "plane RMS", "temporal noise", "accuracy"].map((text) => h("th", { scope: "col" }, text)))),
-        h("tbody", {}, list.reverse().map((one) => h("tr", {}, cell(one.time ?? "emulated"), cell(one.pairs), cell(number(one.mean_mm, 2, "mm")), cell(`${number(100 * one.fill_rate, 2)} %`), cell(number(one.plane_rms_mm, 2, "mm")), cell(number(one.temporal_noise_mm, 2, "mm")), cell(number(one.accuracy_mm, 2, "mm")))))));
+        h("tbody", {}, list.reverse().map((one) => h("tr", {}, cell(one.time ? when(Date.parse(one.time)) : "emulated"), cell(one.pairs), cell(number(one.mean_mm, 2, "mm")), cell(`${number(100 * one.fill_rate, 2)} %`), cell(number(one.plane_rms_mm, 2, "mm")), cell(number(one.temporal_noise_mm, 2, "mm")), cell(number(one.accuracy_mm, 2, "mm")))))));
       if (list.length) show(list[0]);
     } catch (error) {
       notice(error.message, "error", error.hint);

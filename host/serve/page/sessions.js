@@ -1,6 +1,6 @@
 // The captures of the session: pictures, notes and downloads.
 import { act, ended, get, on, store } from "./link.js";
-import { ask, h, button, choice, notice, number } from "./ui.js";
+import { ask, h, button, choice, notice, number, refocus, when } from "./ui.js";
 
 /** Makes the view. `open(name)` shows a capture's depth. */
 export function make(host, open) {
@@ -28,16 +28,19 @@ export function make(host, open) {
   let waiting = 0;
   let shown = [];
   let newest = 0;
-  search.addEventListener("input", () => { clearTimeout(waiting); waiting = setTimeout(refresh, 200); });
+  search.addEventListener("input", () => { clearTimeout(waiting); waiting = setTimeout(() => refresh(), 200); });
 
-  async function refresh() {
+  /** @param {string | number} [focus] The capture, or the place in the list, that gets the focus. */
+  async function refresh(focus) {
     const asked = ++newest;
     try {
       const { captures } = await get(`/api/captures?search=${encodeURIComponent(search.value)}`);
       if (asked !== newest) return; // a later search is on the way
       count.textContent = captures.length === 1 ? "1 capture" : `${captures.length} captures`;
       shown = captures.filter(wanted).sort((a, b) => b.written_unix_s - a.written_unix_s || b.name.localeCompare(a.name));
-      list.replaceChildren(...shown.map((capture) => card(capture, open, refresh)));
+      list.replaceChildren(...shown.map((capture, at) => card(capture, at, open, refresh)));
+      const at = typeof focus === "string" ? shown.findIndex(({ name }) => name === focus) : Math.min(focus ?? -1, shown.length - 1);
+      if (focus !== undefined) refocus(list.children[at]?.querySelector("button") ?? search);
       if (!captures.length) list.append(h("li", { class: "empty" }, search.value ? "Nothing holds all of these words." : "Nothing captured yet."));
     } catch (error) {
       notice(error.message, "error", error.hint);
@@ -52,15 +55,15 @@ export function make(host, open) {
   return { shown: () => { seen = store.state?.captures ?? -1; refresh(); } };
 }
 
-/** `changed` is called after a capture was renamed or deleted. */
-function card(capture, open, changed) {
+/** `changed` is called after a capture was renamed or deleted, with its new name or its place. */
+function card(capture, at, open, changed) {
   const file = capture.has_depth ? "view.png" : capture.images[0];
   // A browser shows a picture that it has again, unless the address changes.
   const picture = `files/${encodeURIComponent(file)}?${store.state?.captures ?? 0}`;
   const path = `/api/captures/${encodeURIComponent(capture.name)}`;
   const focus = capture.optics?.focus;
   const kind = capture.kind === "pair" ? "pair" : capture.images.length === 1 ? "still" : "stack";
-  const facts = [kind, `${capture.width} × ${capture.height}`, `${capture.exposure_us} µs`, focus && `far ${number(focus.far_mm, 0)} mm`, capture.scene && `scene ${capture.scene}`, capture.time ?? (capture.written_unix_s && new Date(1000 * capture.written_unix_s).toLocaleString())];
+  const facts = [kind, `${capture.width} × ${capture.height}`, `${capture.exposure_us} µs`, focus && `far ${number(focus.far_mm, 0)} mm`, capture.scene && `scene ${capture.scene}`, capture.time ? when(Date.parse(capture.time)) : capture.written_unix_s && when(1000 * capture.written_unix_s)];
   return h("li", { class: "capture-card" },
     h("button", { type: "button", class: "thumbnail", onclick: () => open(capture.name), "aria-label": `Open ${capture.name}` },
       capture.broken ? h("span", { class: "bad" }, "broken") : h("img", { src: `${path}/${picture}`, alt: "", loading: "lazy" })),
@@ -70,9 +73,9 @@ function card(capture, open, changed) {
       h("a", { class: "button", href: `${path}/zip`, download: `${capture.name}.zip` }, "ZIP"),
       button("Rename", async () => {
         const name = await ask(`New name of ${capture.name}`, { text: true, yes: "Rename" });
-        if (name && (await act(`${path}/rename`, { name: name.trim() }))) changed();
+        if (name && (await act(`${path}/rename`, { name: name.trim() }))) changed(name.trim());
       }), button("Delete", async () => {
-        if ((await ask(`Delete ${capture.name} with all of its files?`, { yes: "Delete", no: "Keep" })) !== null && (await act(path, {}, "DELETE"))) changed();
+        if ((await ask(`Delete ${capture.name} with all of its files?`, { yes: "Delete", no: "Keep" })) !== null && (await act(path, {}, "DELETE"))) changed(at);
       }, { class: "danger" })));
 }
 

@@ -81,7 +81,7 @@ function rail(key, name, axis, [low, high], marks, absent = false) {
   const words = (at) => (!shared ? marks[at][0] : at === 0 ? marks.map(([mark]) => mark).join(", ") : "");
   return h("div", { class: "rail", "data-state": state },
     h("div", { class: "rail-head" }, h("span", { class: "rail-name" }, name), h("span", { class: "state" }, state),
-      h("output", {}, number(axis.measured_um, 3, "µm"))),
+      h("output", { "aria-live": "off" }, number(axis.measured_um, 3, "µm"))),
     s("svg", { viewBox: `0 0 ${WIDTH} 30`, role: "img", "aria-label": text, ...(absent ? {} : { "data-axis": key, "data-low": low, "data-high": high }) },
       s("rect", { x: RAIL[0], y: 10, width: RAIL[1] - RAIL[0], height: 5, rx: 2.5, class: "track" }),
       marks.map(([, um], at) => s("g", { class: um < low || um > high ? "mark outside" : "mark" },

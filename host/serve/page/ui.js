@@ -21,6 +21,13 @@ function fill(element, attributes, children) {
   return element;
 }
 
+/** Date and time of this computer's clock, the same in every language; a dash for no time. @param {number} unix_ms */
+export function when(unix_ms) {
+  if (!Number.isFinite(unix_ms)) return "–";
+  const date = new Date(unix_ms);
+  return new Date(unix_ms - 60_000 * date.getTimezoneOffset()).toISOString().slice(0, 19).replace("T", " ");
+}
+
 /** A number with so many decimals, a proper minus, and its unit. */
 export function number(value, decimals = 0, unit = "") {
   if (value == null || !Number.isFinite(value)) return "–";
@@ -32,7 +39,8 @@ export function number(value, decimals = 0, unit = "") {
 export function field(label, control, unit) {
   const id = control.id || `field-${++fields}`;
   control.id = id;
-  return h("div", { class: "field" }, h("label", { for: id }, label), control, unit ? h("span", { class: "unit" }, unit) : null);
+  if (unit && !control.title) control.setAttribute("aria-describedby", `${id}-unit`);
+  return h("div", { class: "field" }, h("label", { for: id }, label), control, unit ? h("span", { class: "unit", id: `${id}-unit` }, unit) : null);
 }
 let fields = 0;
 
@@ -57,15 +65,43 @@ export function rows(pairs) {
   return h("dl", { class: "rows" }, pairs.filter(Boolean).map(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]).flat());
 }
 
+/** Tells a screen reader what the eye sees elsewhere. @param {string} text */
+export function say(text) {
+  const place = /** @type {HTMLElement} */ (document.getElementById("said"));
+  place.textContent = text;
+}
+
 /** Tells something that goes away by itself; an error stays until it is closed. */
 export function notice(text, kind = "info", hint, about = "") {
   const place = /** @type {HTMLElement} */ (document.getElementById("notices"));
-  const close = () => box.remove();
+  const close = () => {
+    const within = box.contains(document.activeElement);
+    box.remove();
+    if (within) refocus(place.querySelector("button"));
+  };
   const box = h("div", { class: `notice ${kind}`, "data-about": about }, h("p", {}, text), hint ? h("p", { class: "dim" }, hint) : null,
     button("×", close, { "aria-label": "Close", class: "quiet" }));
   for (const old of [...place.children].slice(0, -2)) old.remove();
   place.append(box);
   if (kind !== "error") setTimeout(close, 5000);
+}
+
+/** Moves the focus; to the view where the wanted control has gone. @param {HTMLElement | null | undefined} [wanted] */
+export function refocus(wanted) {
+  (wanted ?? document.getElementById("view"))?.focus({ preventScroll: true });
+}
+
+/** A value that the browser keeps, or null; with `value`, keeps or removes it. A browser may refuse to keep anything.
+ * @param {"localStorage" | "sessionStorage"} where @param {string} name @param {string | null} [value] @returns {string | null} */
+export function kept(where, name, value) {
+  try {
+    if (value === undefined) return window[where].getItem(name);
+    if (value === null) window[where].removeItem(name);
+    else window[where].setItem(name, value);
+  } catch {
+    // Without it a reload loses control, and the colours are those of the system.
+  }
+  return null;
 }
 
 /** Removes errors that are obsolete: of an earlier job of this kind. @param {string} about */
@@ -87,12 +123,15 @@ export function colour(name) {
  * Returns the function that closes the dialog; the focus goes back to where it was.
  * @param {string} label @param {any[]} children @param {() => void} onescape */
 export function popUp(label, children, onescape) {
-  const dialog = h("dialog", { class: "dialog", "aria-label": label }, children);
+  const dialog = h("dialog", { class: "dialog", tabindex: -1, "aria-label": label }, children);
   /** @param {KeyboardEvent} event */
   const escape = (event) => event.key === "Escape" && onescape();
   addEventListener("keydown", escape);
+  const typing = document.activeElement?.matches("input, textarea, select");
   document.body.append(dialog);
   dialog.show();
+  // What is typed at this moment is meant for another field.
+  if (typing) dialog.focus();
   return () => {
     removeEventListener("keydown", escape);
     dialog.close();
@@ -107,7 +146,7 @@ export function ask(question, { text = false, yes = "Continue", no = "Cancel", s
     const input = h("input", { type: "text", "aria-label": "Answer", hidden: !text });
     /** @param {string | null} answer */
     const finish = (answer) => { close(); done(answer); };
-    const close = popUp("Question", [h("p", {}, question), input,
+    const close = popUp(question, [h("p", {}, question), input,
       h("div", { class: "actions" }, button(no, () => finish(null)), button(yes, () => finish(input.value), { class: "primary" }))], () => finish(null));
     input.addEventListener("keydown", (event) => {
       if (event.key !== "Enter") return;
@@ -124,19 +163,31 @@ export const altered = (input) => input.dataset.typed !== undefined && input.dat
 /** The number in an input; null where it is empty. The browser gives an empty value also for a text that is not a number: only `badInput` differs.
  * @param {HTMLInputElement} input @returns {number | null} */
 export function optional(input) {
-  if (input.validity.badInput || altered(input)) throw new Error(`${nameOf(input)}: expected a number`);
+  if (input.validity.badInput || altered(input)) throw wrong(input, "expected a number");
   return input.value === "" ? null : Number(input.value);
 }
 
 /** The number in an input that must have one. @param {HTMLInputElement} input */
 export function numeric(input) {
   const value = optional(input);
-  if (value === null) throw new Error(`${nameOf(input)}: expected a number, the field is empty`);
+  if (value === null) throw wrong(input, "expected a number, the field is empty");
   return value;
+}
+
+/** Marks an input until it is changed, and gives the error. @param {HTMLInputElement} input @param {string} text */
+function wrong(input, text) {
+  input.setAttribute("aria-invalid", "true");
+  input.addEventListener("input", () => altered(input) || input.removeAttribute("aria-invalid"), { once: true });
+  return new Error(`${nameOf(input)}: ${text}`);
 }
 
 /** @param {HTMLInputElement} input */
 const nameOf = (input) => input.getAttribute("aria-label") ?? input.labels?.[0]?.textContent ?? "value";
+
+/** Words that are there already cost nothing. @param {HTMLElement} place @param {string} text */
+export function write(place, text) {
+  if (place.textContent !== text) place.textContent = text;
+}
 
 /** Fills a place anew only when `key` changes: a button that is replaced under a click is not pressed. */
 export function keep(host, key, build) {

@@ -7,7 +7,7 @@ use axum::{
     extract::DefaultBodyLimit,
     handler::Handler,
     http::Method,
-    routing::{MethodRouter, delete, get, post, put},
+    routing::{MethodFilter, MethodRouter, get, on, put},
 };
 use schemars::{JsonSchema, SchemaGenerator, generate::SchemaSettings};
 use serde_json::{Map, Value, json};
@@ -79,17 +79,7 @@ impl Api {
         about: &str,
         handler: H,
     ) -> Self {
-        self.changing::<B, R>(path, "post", who, about, post(handler))
-    }
-
-    pub fn put<B: JsonSchema, R: JsonSchema, H: Handler<T, Arc<App>>, T: 'static>(
-        self,
-        path: &str,
-        who: For,
-        about: &str,
-        handler: H,
-    ) -> Self {
-        self.changing::<B, R>(path, "put", who, about, put(handler))
+        self.change::<B, R, _, _>(path, Method::POST, who, about, handler)
     }
 
     pub fn put_bytes<R: JsonSchema, H: Handler<T, Arc<App>>, T: 'static>(
@@ -103,51 +93,36 @@ impl Api {
             "summary": about,
             "requestBody": { "required": true, "content": { "application/octet-stream": {} } },
             "responses": responses(answer),
-            "parameters": [client("Secret of the client that has control.")],
+            "parameters": [client(For::Control)],
         });
         self.access.insert((path.into(), Method::PUT), For::Control);
         self.add(path, "put", put(handler).layer(DefaultBodyLimit::disable()), operation)
     }
 
-    pub fn delete<B: JsonSchema, R: JsonSchema, H: Handler<T, Arc<App>>, T: 'static>(
-        self,
+    /// Adds a route of this method.
+    pub fn change<B: JsonSchema, R: JsonSchema, H: Handler<T, Arc<App>>, T: 'static>(
+        mut self,
         path: &str,
+        method: Method,
         who: For,
         about: &str,
         handler: H,
     ) -> Self {
-        self.changing::<B, R>(path, "delete", who, about, delete(handler))
-    }
-
-    fn changing<B: JsonSchema, R: JsonSchema>(
-        mut self,
-        path: &str,
-        method: &str,
-        who: For,
-        about: &str,
-        route: MethodRouter<Arc<App>>,
-    ) -> Self {
-        let (body, answer) = (self.json_of::<B>(), self.json_of::<R>());
-        let of = if method == "put" {
-            Method::PUT
-        } else if method == "delete" {
-            Method::DELETE
-        } else {
-            Method::POST
+        let Ok(filter) = MethodFilter::try_from(method.clone()) else {
+            unreachable!("a method that axum routes")
         };
-        self.access.insert((path.into(), of), who);
+        let (body, answer) = (self.json_of::<B>(), self.json_of::<R>());
         let mut operation = json!({
             "summary": about,
             "requestBody": { "required": true, "content": body },
             "responses": responses(answer),
         });
         if who != For::All {
-            operation["parameters"] = json!([client(match who {
-                For::Control => "Secret of the client that has control.",
-                _ => "Secret of a client, from the first message on the socket.",
-            })]);
+            operation["parameters"] = json!([client(who)]);
         }
-        self.add(path, method, route, operation)
+        let name = method.as_str().to_lowercase();
+        self.access.insert((path.into(), method), who);
+        self.add(path, &name, on(filter, handler), operation)
     }
 
     /// Adds a query parameter to the GET route of `path`.
@@ -204,7 +179,11 @@ impl Api {
     }
 }
 
-fn client(about: &str) -> Value {
+fn client(who: For) -> Value {
+    let about = match who {
+        For::Control => "Secret of the client that has control.",
+        For::Client | For::All => "Secret of a client, from the first message on the socket.",
+    };
     json!({
         "name": CLIENT_HEADER,
         "in": "header",

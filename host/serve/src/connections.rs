@@ -246,8 +246,14 @@ impl LimitedStream {
         Poll::Ready(io::ErrorKind::TimedOut.into())
     }
 
-    fn wrote(&mut self) {
-        self.active = Instant::now();
+    /// Returns an error if the client takes no byte before the idle time-out.
+    fn wrote(&mut self, cx: &mut Context<'_>, written: Poll<io::Result<usize>>) -> Poll<io::Result<usize>> {
+        if written.is_ready() {
+            self.active = Instant::now();
+            return written;
+        }
+        let deadline = self.active + self.limits.idle_timeout;
+        self.poll_deadline(cx, Some(deadline)).map(Err)
     }
 }
 
@@ -292,16 +298,8 @@ impl AsyncRead for LimitedStream {
 
 impl AsyncWrite for LimitedStream {
     fn poll_write(mut self: Pin<&mut Self>, cx: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
-        match Pin::new(&mut self.stream).poll_write(cx, bytes) {
-            Poll::Ready(written) => {
-                self.wrote();
-                Poll::Ready(written)
-            }
-            Poll::Pending => {
-                let deadline = self.active + self.limits.idle_timeout;
-                self.poll_deadline(cx, Some(deadline)).map(Err)
-            }
-        }
+        let written = Pin::new(&mut self.stream).poll_write(cx, bytes);
+        self.wrote(cx, written)
     }
 
     fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
@@ -317,16 +315,8 @@ impl AsyncWrite for LimitedStream {
         cx: &mut Context<'_>,
         parts: &[io::IoSlice<'_>],
     ) -> Poll<io::Result<usize>> {
-        match Pin::new(&mut self.stream).poll_write_vectored(cx, parts) {
-            Poll::Ready(written) => {
-                self.wrote();
-                Poll::Ready(written)
-            }
-            Poll::Pending => {
-                let deadline = self.active + self.limits.idle_timeout;
-                self.poll_deadline(cx, Some(deadline)).map(Err)
-            }
-        }
+        let written = Pin::new(&mut self.stream).poll_write_vectored(cx, parts);
+        self.wrote(cx, written)
     }
 
     fn is_write_vectored(&self) -> bool {

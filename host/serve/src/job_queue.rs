@@ -12,12 +12,14 @@ use std::{
 };
 
 use farnear_workflows::{Cancel, Context, WorkflowError};
+use serde::Serialize;
 use serde_json::Value;
 
 use crate::{
     app::{App, lock},
     face::Face,
     failure, live,
+    routes::rig::figures,
     view::{Job, JobPhase, LiveMode, State},
 };
 
@@ -32,6 +34,18 @@ pub struct Task {
     pub kind: &'static str,
     pub title: String,
     pub work: Work,
+}
+
+impl Task {
+    /// The job's result are the figures that `work` returns.
+    pub fn new<F: Serialize>(
+        kind: &'static str,
+        title: impl Into<String>,
+        work: impl FnOnce(&App, &Context<'_>) -> Result<F, WorkflowError> + Send + 'static,
+    ) -> Self {
+        let work = move |app: &App, context: &Context<'_>| figures(work(app, context)?);
+        Self { kind, title: title.into(), work: Box::new(work) }
+    }
 }
 
 #[derive(Default)]
@@ -235,8 +249,7 @@ mod tests {
         let thread = std::thread::spawn(move || run_rig(&rig, &jobs, panics));
         wait_for(&app, |state| state.live.error.as_ref().is_some_and(|error| error.contains("panic")));
         assert_eq!(app.state().live.mode, LiveMode::Off);
-        let work: Work = Box::new(|_, _| Ok(Value::Null));
-        let begun = app.begin_on_rig(Task { kind: "home", title: "Home".into(), work });
+        let begun = app.begin_on_rig(Task::new("home", "Home", |_, _| Ok(())));
         assert_eq!(begun, Ok(1));
         wait_for(&app, |state| state.job.as_ref().is_some_and(|job| job.phase == JobPhase::Done));
         app.end();
@@ -252,12 +265,12 @@ mod tests {
         let thread = std::thread::spawn(move || run_computing(&computer, &jobs));
         let (begins, begun) = channel();
         let (end, may_end) = channel::<()>();
-        let work: Work = Box::new(move |_, _| {
+        let task = Task::new("depth", "Depth", move |_, _| {
             let _ = begins.send(());
             let _ = may_end.recv();
-            Ok(Value::Null)
+            Ok(())
         });
-        assert_eq!(app.begin_computing(Task { kind: "depth", title: "Depth".into(), work }), Ok(1));
+        assert_eq!(app.begin_computing(task), Ok(1));
         begun.recv().expect("the job runs");
         let (free, mut freed_early) = (AtomicBool::new(false), false);
         std::thread::scope(|scope| {

@@ -183,7 +183,7 @@ impl Rate {
 pub(crate) mod tests {
     use std::{fs, path::Path, sync::Arc, time::Duration};
 
-    use farnear_protocol::{Micros, message::LightLevels};
+    use farnear_protocol::message::LightLevels;
     use farnear_workflows::{optics::GivenOptics, rig::camera::CameraAddress};
 
     use super::*;
@@ -192,10 +192,8 @@ pub(crate) mod tests {
     pub(crate) fn app(folder: &Path) -> Arc<App> {
         let camera = CameraSettings {
             address: CameraAddress::Folder(folder.into()),
-            exposure: Micros(5_000),
             image_wait: Duration::from_secs(1),
-            settings: Vec::new(),
-            light: None,
+            ..CameraSettings::default()
         };
         let listen = Listen::Loopback { port: 0 };
         let guard = Guard::new(&listen, 0);

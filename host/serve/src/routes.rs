@@ -81,7 +81,7 @@ pub fn service(app: &Arc<App>) -> Router {
 }
 
 /// Applies the guard and sets the content policy.
-async fn guarded(app: Arc<App>, access: Arc<Access>, request: Request, next: Next) -> Response {
+async fn guarded(app: Arc<App>, access: Arc<Access>, mut request: Request, next: Next) -> Response {
     let headers = request.headers();
     let peer =
         request.extensions().get::<ConnectInfo<Peer>>().map(|ConnectInfo(Peer(peer))| Arc::clone(peer));
@@ -95,10 +95,16 @@ async fn guarded(app: Arc<App>, access: Arc<Access>, request: Request, next: Nex
         peer.begin_request();
     }
     let mut response = match allowed {
-        Ok(()) => match permitted(&app, &access, &request) {
-            Ok(()) => next.run(request).await,
-            Err(failure) => failure.into_response(),
-        },
+        Ok(()) => {
+            let who = who_may(&access, &request);
+            match permitted(&app, who, secret(headers)) {
+                Ok(()) => {
+                    request.extensions_mut().insert(who);
+                    next.run(request).await
+                }
+                Err(failure) => failure.into_response(),
+            }
+        }
         Err(Refused::Token) if app.guard.has_token(headers) && !delayed(&app, peer.as_deref()).await => {
             too_many()
         }
@@ -135,14 +141,28 @@ async fn as_json(response: Response) -> Response {
     Failure::new(status, String::from_utf8_lossy(&text)).into_response()
 }
 
-/// Checked before the body is read.
-fn permitted(app: &App, access: &Access, request: &Request) -> Result<(), Failure> {
-    let Some(path) = request.extensions().get::<MatchedPath>() else { return Ok(()) };
-    match access.get(&(path.as_str().to_owned(), request.method().clone())) {
-        Some(For::Control) => require_control(app, request.headers()),
-        Some(For::Client) => require_client(app, request.headers()),
-        Some(For::All) | None => Ok(()),
+fn who_may(access: &Access, request: &Request) -> For {
+    let path = request.extensions().get::<MatchedPath>();
+    path.and_then(|path| access.get(&(path.as_str().to_owned(), request.method().clone())))
+        .copied()
+        .unwrap_or(For::All)
+}
+
+/// Checked before the body is read, and again after it: control may change hands meanwhile.
+fn permitted(app: &App, who: For, secret: &str) -> Result<(), Failure> {
+    match who {
+        For::Control if !app.with_control(|control| control.has_control(secret)) => {
+            Err(Failure::new(StatusCode::FORBIDDEN, "another browser has control of the rig")
+                .with_hint("Ask for control first."))
+        }
+        For::Client if app.with_control(|control| control.id_of(secret)).is_none() => Err(unknown_client()),
+        For::Control | For::Client | For::All => Ok(()),
     }
+}
+
+pub fn unknown_client() -> Failure {
+    let error = "unknown client: send the secret of a connected socket in x-farnear-client";
+    Failure::new(StatusCode::FORBIDDEN, error)
 }
 
 pub async fn delayed(app: &App, peer: Option<&Connection>) -> bool {
@@ -157,7 +177,7 @@ pub fn too_many() -> Response {
         .into_response()
 }
 
-/// A JSON body with JSON errors.
+/// A JSON body with JSON errors, of a client that may still use the route.
 pub struct Body<T>(pub T);
 
 impl<T: DeserializeOwned> FromRequest<Arc<App>> for Body<T> {
@@ -170,6 +190,8 @@ impl<T: DeserializeOwned> FromRequest<Arc<App>> for Body<T> {
             let error = "expected the header Content-Type: application/json";
             return Err(Failure::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, error));
         }
+        let who = request.extensions().get::<For>().copied().unwrap_or(For::All);
+        let client = secret(request.headers()).to_owned();
         let within = app.limits.body_timeout;
         let body = tokio::time::timeout(within, Bytes::from_request(request, app)).await;
         let late = |_| {
@@ -179,6 +201,7 @@ impl<T: DeserializeOwned> FromRequest<Arc<App>> for Body<T> {
             )
         };
         let bytes = body.map_err(late)?.map_err(|error| Failure::new(error.status(), error.body_text()))?;
+        permitted(app, who, &client)?;
         match Json::<T>::from_bytes(&bytes) {
             Ok(Json(body)) => Ok(Self(body)),
             Err(rejection) => Err(Failure::new(rejection.status(), plain(&rejection.body_text()))),
@@ -195,25 +218,6 @@ fn plain(text: &str) -> String {
     .iter()
     .find_map(|start| text.strip_prefix(start))
     .map_or_else(|| text.to_owned(), |reason| format!("request body: {reason}"))
-}
-
-pub fn require_control(app: &App, headers: &HeaderMap) -> Result<(), Failure> {
-    let secret = secret(headers);
-    if app.with_control(|control| control.has_control(secret)) {
-        return Ok(());
-    }
-    Err(Failure::new(StatusCode::FORBIDDEN, "another browser has control of the rig")
-        .with_hint("Ask for control first."))
-}
-
-pub fn require_client(app: &App, headers: &HeaderMap) -> Result<(), Failure> {
-    match app.with_control(|control| control.id_of(secret(headers))) {
-        Some(_) => Ok(()),
-        None => Err(Failure::new(
-            StatusCode::FORBIDDEN,
-            "unknown client: send the secret of a connected socket in x-farnear-client",
-        )),
-    }
 }
 
 pub fn secret(headers: &HeaderMap) -> &str {

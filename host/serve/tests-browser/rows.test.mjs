@@ -299,7 +299,7 @@ test("notices cover no button, and the log has times", async () => {
   }).map((button) => button.textContent));
   assert.deepEqual(covered, []);
   await page.locator("#tab-log").click();
-  await page.waitForFunction(() => /^\S*\d:\d\d:\d\d.* {2}Learn the correction$/m.test(document.querySelector(".log").textContent));
+  await page.waitForFunction(() => /^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d {2}Learn the correction$/m.test(document.querySelector(".log").textContent));
   await page.context().close();
 });
 

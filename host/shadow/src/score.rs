@@ -156,21 +156,4 @@ mod tests {
         assert_eq!(score.wrongly_removed_percent(), None);
         assert_eq!(score.iou_percent(), None);
     }
-
-    #[test]
-    fn another_shape_is_an_error_that_names_both() {
-        let mut score = ShadowScore::default();
-        let error =
-            score.add(None, Array2::from_elem((2, 3), false).view(), Array2::from_elem((4, 5), B).view());
-        let text = error.unwrap_err().to_string();
-        assert!(text.contains("3x2") && text.contains("5x4"), "{text}");
-    }
-
-    #[test]
-    fn grey_values_of_the_ground_truth() {
-        assert_eq!(Truth::from_grey(50), Some(S));
-        assert_eq!(Truth::from_grey(85), Some(X));
-        assert_eq!(Truth::from_grey(255), Some(P));
-        assert_eq!(Truth::from_grey(33), None);
-    }
 }

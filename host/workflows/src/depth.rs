@@ -39,7 +39,7 @@ use method::Prepared;
 use noise::Uncertainty;
 use output::Results;
 use pair::Pair;
-use part::{AROUND_PX, Cut};
+use part::{AROUND_PX, Cut, Part};
 pub use request::DepthRequest;
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -105,6 +105,8 @@ struct Inputs {
     correction: Option<Arc<Correction>>,
     camera: Option<Arc<CameraFrames>>,
     cut: Option<Cut>,
+    /// Place of the map in the images; `None` for all of them.
+    part: Option<Part>,
     doubts: Vec<OpticsDoubt>,
 }
 
@@ -155,6 +157,7 @@ impl Inputs {
                             camera frames";
             return Err(WorkflowError::parameter("camera-frames", frames.display(), expected));
         }
+        let image = pair.far.dim();
         let bin = settings.bin_for(&optics, is_mosaic(pair.far.view()), &mut doubts);
         if bin > 1 {
             let [far, near] = [&mut pair.far, &mut pair.near].map(|image| binned(std::mem::take(image), bin));
@@ -164,6 +167,8 @@ impl Inputs {
         let optics = optics.binned(bin);
         let around = optics.distortion().is_none().then_some(AROUND_PX);
         let cut = settings.region.map(|region| Cut::out_of(&mut pair, region, around)).transpose()?;
+        let bins = bin * optics.stage().map_or(1, |stage| stage.bin);
+        let part = cut.map(|cut| cut.part()).or_else(|| Part::of_bins(image, bins));
         let method =
             Prepared::new(settings.method(), settings.operators.as_deref(), &optics, &context.cache)?;
         let correction =
@@ -184,7 +189,7 @@ impl Inputs {
             }
             camera => camera,
         };
-        Ok(Self { optics, pair, method, correction, camera, cut, doubts })
+        Ok(Self { optics, pair, method, correction, camera, cut, part, doubts })
     }
 
     /// Takes the images out of `self` to release their memory early.

@@ -27,7 +27,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_with::{DisplayFromStr, serde_as};
 
-pub(crate) use images::fill_specks;
+pub use images::fill_specks;
 pub use in_memory::{PreparedStack, prepare_stack};
 pub use positions::{depth_of_places, even_positions};
 
@@ -280,6 +280,9 @@ struct Record<'a> {
     /// Brightness of each image relative to the usual one; images are divided by it.
     #[serde(skip_serializing_if = "is_even")]
     brightness: &'a [f64],
+    /// Largest change over the stack, as a logarithm, of the vignetting that images are divided by.
+    #[serde(skip_serializing_if = "is_zero")]
+    vignetting: f64,
     left_out: &'a [String],
     positions: &'a [f64],
     distortion: Option<DistortionSection>,
@@ -287,6 +290,10 @@ struct Record<'a> {
     object_pixel_um: Option<f64>,
     optics: Option<Optics>,
     input: Vec<HashedFile>,
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 fn is_even(gains: &[f64]) -> bool {
@@ -327,6 +334,14 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
     listed.without(&indices);
     let moved_px = request.align.0.map(|_| frames::farthest_px(&frames.warps, images.dim(0)));
     let unseen = images.prepare(listed.distortion(), &frames.warps)?;
+    // Of aligned images, because a lens that breathes in uneven light looks alike.
+    let vignetting = images.even_vignetting(&listed.even_positions())?;
+    if vignetting > 0.0 {
+        context.info(&format!(
+            "evening out vignetting that changes by up to {:.0} % over the stack",
+            100.0 * vignetting
+        ));
+    }
     context.info(&format!("measuring {} images by {}", images.count(), request.measure));
     let mut map =
         focus_stack::depth_from_positions(&images, &listed.even_positions(), &request.computation())?;
@@ -354,6 +369,7 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
         white_level: request.white_level,
         images: &names,
         brightness: &frames.gains,
+        vignetting: rounded(vignetting, 4),
         left_out: &figures.left_out,
         positions: &listed.positions,
         distortion: listed.distortion().map(DistortionSection::from),

@@ -128,11 +128,20 @@ impl fmt::Display for OpticsDoubt {
                 "the images look like the raw mosaic of a colour sensor: {bin} x {bin} pixels were averaged into one, which \
                  makes them grey; bin 1 keeps all pixels"
             ),
-            Self::LittleBlur { blur_px, bin } => write!(
-                f,
-                "averaging {bin} x {bin} pixels leaves a largest blur of {blur_px:.2} px: fine texture aliases then, and depth may be \
-                 off by several of its standard deviations; average fewer pixels, or choose planes that are farther apart"
-            ),
+            Self::LittleBlur { blur_px, bin } => {
+                if *bin > 1 {
+                    write!(f, "averaging {bin} x {bin} pixels leaves ")?;
+                }
+                write!(
+                    f,
+                    "a largest blur of {blur_px:.2} px: fine texture aliases then, and depth may be off by several of its standard \
+                     deviations; "
+                )?;
+                if *bin > 1 {
+                    f.write_str("average fewer pixels, or ")?;
+                }
+                f.write_str("choose planes that are farther apart")
+            }
             Self::TooMuchBlur { blur_px, bin, binned } => {
                 write!(f, "a largest blur of {blur_px:.1} px is more than the 2 to 4 px that can be used: ")?;
                 match binned {

@@ -10,7 +10,6 @@ use crate::units::{BoardMicros, Nanometres};
 /// An alarm with its number and time.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct AlarmRecord {
     /// Number in this board's life, from 1.
     pub number: u32,
@@ -23,7 +22,6 @@ pub struct AlarmRecord {
 /// What raised an alarm, with the offending axis or value.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum Alarm {
     /// Emergency-stop input open; cannot be cleared until it closes.
     EmergencyStop,

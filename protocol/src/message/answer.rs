@@ -11,7 +11,6 @@ use crate::units::{Micros, Nanometres};
 
 /// Answer to a request that was executed or accepted.
 #[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum Response {
     Hello(Hello),
     Status(Status),
@@ -32,7 +31,6 @@ pub enum Response {
 /// Why a request was rejected. Nothing has changed.
 #[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum RequestError {
     /// Unsupported frame version. This variant has the same bytes in all versions.
     Version { min: u8, current: u8 },

@@ -58,7 +58,6 @@ pub enum PositionState {
 
 /// Commanded and measured position of an axis.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct AxisStatus {
     pub state: PositionState,
     pub asked: Nanometres,

@@ -9,7 +9,6 @@ use crate::units::{BoardMicros, Micros, Nanometres};
 
 /// Identity and capabilities of the board.
 #[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Eq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Hello {
     pub protocol_min: u8,
     pub protocol_current: u8,
@@ -32,7 +31,6 @@ pub struct Hello {
 
 /// Fitted parts; all `true` for the rig of `docs/rig.md`.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Capabilities {
     /// Stage A's stepper and screw.
     pub sensor_coarse: bool,
@@ -59,7 +57,6 @@ impl Capabilities {
 
 /// Ranges and sizes of the board.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Limits {
     /// Distance of principal plane and sensor with all axes at 0.
     pub datum: Nanometres,
@@ -95,7 +92,6 @@ impl Limits {
 
 /// Why the processor was reset, from its flags.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum ResetCause {
     PowerOn,
     Pin,
@@ -103,9 +99,7 @@ pub enum ResetCause {
     Software,
     /// Independent watchdog: the firmware had hung.
     Watchdog,
-    /// Brown-out of the supply.
     BrownOut,
-    /// Reset from a low-power state.
     LowPower,
     /// Unknown combination of flags.
     Unknown,
@@ -113,7 +107,6 @@ pub enum ResetCause {
 
 /// Positions, switches, alarm, program and counters of the board.
 #[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Eq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Status {
     pub time: BoardMicros,
     pub coarse: AxisStatus,
@@ -159,7 +152,6 @@ impl Status {
 
 /// Link statistics since the reset.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug, Default)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct LinkCounters {
     pub frames: u32,
     /// Frames with a wrong CRC, length or encoding.

@@ -6,9 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::Axis;
 use crate::units::Nanometres;
 
-/// A calibration routine.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum Routine {
     /// Travel between home and far switch; homes the axis.
     Travel { axis: Axis },
@@ -22,7 +20,6 @@ pub enum Routine {
 
 /// Result of a routine. All but travel is stored as settings.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum Calibration {
     /// Distance between the switches.
     Travel { axis: Axis, length: Nanometres },

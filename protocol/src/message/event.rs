@@ -8,7 +8,6 @@ use crate::units::{BoardMicros, Micros, Nanometres};
 
 /// An event with the board's time. The frame's id is the event number, from 0 at each boot.
 #[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Eq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Event {
     pub time: BoardMicros,
     pub kind: EventKind,
@@ -16,7 +15,6 @@ pub struct Event {
 
 /// Type and data of an event.
 #[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Eq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum EventKind {
     /// The board has started; always event 0.
     Started {
@@ -124,9 +122,33 @@ pub enum EventKind {
     },
 }
 
+impl EventKind {
+    /// The request whose work ends with this event.
+    pub const fn ended(&self) -> Option<u32> {
+        match self {
+            Self::Homed { request, .. }
+            | Self::MoveDone { request, .. }
+            | Self::ProgramDone { request, .. }
+            | Self::ContinuousDone { request, .. }
+            | Self::Calibrated { request, .. }
+            | Self::Failed { request, .. } => Some(*request),
+            Self::Started { .. }
+            | Self::ShotDone { .. }
+            | Self::Alarm(_)
+            | Self::AlarmCleared { .. }
+            | Self::StillThere { .. }
+            | Self::ShotReady { .. }
+            | Self::Paused { .. }
+            | Self::RecordRepaired { .. }
+            | Self::FrameTaken { .. }
+            | Self::FrameDropped { .. }
+            | Self::Flash { .. } => None,
+        }
+    }
+}
+
 /// Why long work failed.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum Failure {
     /// [`super::Request::Stop`] or [`super::Request::Reboot`].
     Stopped,

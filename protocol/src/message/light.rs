@@ -13,7 +13,6 @@ pub const LIGHT_TIME_MAX: Micros = Micros(60_000_000);
 /// Brightness of both outputs in thousandths: the duty cycle of a 21 kHz PWM. 0 is off, 1000 on without a gap.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct LightLevels {
     pub first: u16,
     pub second: u16,

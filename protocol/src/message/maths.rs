@@ -27,7 +27,6 @@ pub enum CorrectionForm {
 }
 
 impl CorrectionForm {
-    /// Number of coefficients.
     pub const fn coefficients(self) -> u8 {
         match self {
             Self::Regions | Self::Blend => 90,
@@ -38,7 +37,6 @@ impl CorrectionForm {
 
 /// Form and scale of a correction.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct CorrectionInfo {
     pub form: CorrectionForm,
     pub width: u16,
@@ -71,7 +69,6 @@ pub enum CorrectionFault {
 
 /// Place and time for sun and shadow. Degrees times 10^7; north and east positive.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct SunQuery {
     pub unix_seconds: i64,
     pub latitude_e7: i32,
@@ -82,7 +79,6 @@ pub struct SunQuery {
 
 /// Camera and subject of a shadow.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct ShadowQuery {
     /// Camera azimuth, ANTICLOCKWISE from north, degrees times 10^7.
     pub azimuth_e7: i32,
@@ -98,7 +94,6 @@ pub struct ShadowQuery {
 
 /// Standard deviations of a shadow's inputs.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct QueryDeviations {
     /// Day, in thousandths of a day.
     pub day_e3: u32,
@@ -113,7 +108,6 @@ pub struct QueryDeviations {
 
 /// Position of the sun, without refraction.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct SunAnswer {
     pub elevation_deg: f32,
     /// Azimuth, clockwise from north.
@@ -123,7 +117,6 @@ pub struct SunAnswer {
 
 /// Angle of a shadow in the image.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum ShadowAnswer {
     /// The shadow is visible.
     Angle {

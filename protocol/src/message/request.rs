@@ -13,7 +13,6 @@ use crate::units::{Micros, Nanometres};
 /// another answer, the answer is [`super::Response::Accepted`]; long work that fails ends with
 /// [`super::EventKind::Failed`].
 #[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Eq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum Request {
     /// Identify the board. Needs no session or new id; boot number 0 (unknown) is valid. Answer:
     /// [`super::Response::Hello`].

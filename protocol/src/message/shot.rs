@@ -8,7 +8,6 @@ use crate::units::{BoardMicros, Micros, Nanometres};
 
 /// An entry of an exposure program.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Shot {
     /// Axis to move before the exposure.
     pub axis: Axis,
@@ -27,7 +26,6 @@ pub struct Shot {
 /// Why a shot was rejected.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum ShotFault {
     /// Index not below [`super::Limits::shots_max`], or an empty program.
     Index,
@@ -41,7 +39,6 @@ pub enum ShotFault {
 
 /// Measurements of one exposure.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct ShotRecord {
     pub index: u8,
     /// Repeat of the shot, from 0.
@@ -106,7 +103,6 @@ pub enum TriggerMode {
 
 /// State of the exposure program.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct ProgramStatus {
     pub state: ProgramState,
     pub shots: u8,
@@ -119,7 +115,6 @@ pub struct ProgramStatus {
 /// Phase of the exposure program.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum ProgramState {
     /// Not armed: shots may be loaded.
     Idle,

@@ -1,11 +1,11 @@
 //! Static programs: linked with musl by Rust's own linker, without a cross compiler.
 
-use std::{path::PathBuf, process::Command};
+use std::path::PathBuf;
 
 use anyhow::Result;
 
 use super::Release;
-use crate::run::{ROOT, cargo, finish, has, has_target, step, target_folder};
+use crate::run::{ROOT, add_target, cargo, cargo_home, finish, has, step, target_folder};
 
 pub struct Target {
     pub triple: &'static str,
@@ -41,8 +41,8 @@ impl Target {
 /// Returns the programs' folder, or the missing tool.
 pub fn build(release: &Release, target: &Target) -> Result<Result<PathBuf, String>> {
     step(&format!("programs for {}", target.triple));
-    if !(has_target(target.triple) || rustup_adds(target.triple)) {
-        return Ok(Err(format!("the target is missing: rustup target add {}", target.triple)));
+    if let Err(missing) = add_target(target.triple) {
+        return Ok(Err(missing));
     }
     let variable = format!("CARGO_TARGET_{}_LINKER", target.triple.to_uppercase().replace('-', "_"));
     finish(
@@ -58,17 +58,10 @@ pub fn build(release: &Release, target: &Target) -> Result<Result<PathBuf, Strin
 
 /// Compiler flags that remove this machine's paths from programs.
 pub fn without_paths() -> Vec<String> {
-    let home = std::env::var_os("CARGO_HOME")
-        .map(PathBuf::from)
-        .or_else(|| std::env::home_dir().map(|home| home.join(".cargo")));
-    let folders = [(Some(ROOT.clone()), "farnear"), (home, "cargo")];
+    let folders = [(Some(ROOT.clone()), "farnear"), (cargo_home(), "cargo")];
     folders
         .into_iter()
         .filter_map(|(folder, name)| folder.map(|folder| (folder, name)))
         .map(|(folder, name)| format!("--remap-path-prefix={}={name}", folder.display()))
         .collect()
-}
-
-fn rustup_adds(triple: &str) -> bool {
-    Command::new("rustup").args(["target", "add", triple]).status().is_ok_and(|status| status.success())
 }

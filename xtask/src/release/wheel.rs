@@ -11,7 +11,7 @@ use anyhow::{Result, ensure};
 use super::{Release, copy, programs::without_paths};
 use crate::{
     python,
-    run::{ROOT, finish, has_target, step, succeeds, target_folder},
+    run::{ROOT, add_target, finish, step, target_folder},
 };
 
 const NEEDS: [&str; 1] = ["maturin[zig]>=1.9,<2"];
@@ -33,8 +33,8 @@ pub fn write(release: &Release, notices: &Path) -> Result<Result<Vec<PathBuf>, S
     copy(notices, &ROOT.join("python"))?;
     for target in TARGETS {
         step(&format!("the Python package's wheel for {target}"));
-        if !has_target(target) && !succeeds(Command::new("rustup").args(["target", "add", target])) {
-            return Ok(Err(format!("the target is missing: rustup target add {target}")));
+        if let Err(missing) = add_target(target) {
+            return Ok(Err(missing));
         }
         finish(
             Command::new(&python)

@@ -82,10 +82,11 @@ const fn limit_keys(axis: Axis) -> (SettingKey, SettingKey) {
 /// Default, smallest and largest value. Reasons in [`Settings`] are not repeated.
 const fn range(key: SettingKey) -> (i32, i32, i32) {
     match key {
-        // The thesis' lens (f = 50 mm) needs 52.8 to 53.0 mm (Li 2014, chapter 4): 5.9 mm into the travel.
-        SettingKey::DatumNm => (47_000_000, 10_000_000, 200_000_000),
+        // The thesis' lens (f = 50 mm) needs 52.8 to 53.0 mm (Li 2014, chapter 4): 5.9 mm into the travel. Lenses of 4 mm
+        // focus closer, those of 400 mm further.
+        SettingKey::DatumNm => (47_000_000, 1_000_000, DISTANCE_NM),
         // Homing brakes a quarter of a millimetre beyond the switch, possibly on both stages.
-        SettingKey::DistanceMinNm => (46_450_000, 0, 200_000_000),
+        SettingKey::DistanceMinNm => (46_450_000, 0, DISTANCE_NM),
         SettingKey::CoarseMinNm | SettingKey::LensMinNm => (0, 0, TRAVEL_NM),
         SettingKey::CoarseMaxNm | SettingKey::LensMaxNm => (TRAVEL_NM, 0, TRAVEL_NM),
         // 6.25 mm/s is 40 kHz: 13 mm in 2.2 s, and 750 rpm, where such a motor still has torque at 24 V.
@@ -120,6 +121,8 @@ const fn range(key: SettingKey) -> (i32, i32, i32) {
     }
 }
 
+/// Largest distance of sensor and lens; with both travels it stays within 32 bits.
+const DISTANCE_NM: i32 = 1_000_000_000;
 /// The micrometers' travel; the far switches sit beyond it.
 const TRAVEL_NM: i32 = 13_000_000;
 /// 5 um at each end of the stroke are the loop's: hysteresis and creep move the ends, and saturation prevents damping.
@@ -205,6 +208,17 @@ mod tests {
         let settings = Settings::DEFAULT.with(&values);
         assert_eq!((settings.lens.home_search_speed, settings.lens.home_leave_speed), (3_200, 3_200));
         assert_eq!(settings.coarse.home_search_speed, Settings::DEFAULT.coarse.home_search_speed);
+    }
+
+    #[test]
+    fn the_datum_suits_short_and_long_lenses() {
+        let mut values = Values::DEFAULT;
+        // Lenses of 4, 8 and 400 mm, focused a few millimetres into the travel.
+        for datum in [2_000_000, 3_000_000, 405_000_000] {
+            for key in [SettingKey::DatumNm, SettingKey::DistanceMinNm] {
+                assert_eq!(values.set(key, datum), Ok(()), "{datum}");
+            }
+        }
     }
 
     #[test]

@@ -80,6 +80,10 @@ impl Driver {
         if std::mem::take(&mut self.lines.renamed) {
             self.rename_port();
         }
+        // Bytes on the line let time pass, and a board that stays without power never takes them.
+        if !self.powered && self.schedule.is_over() {
+            self.line.lose();
+        }
     }
 
     /// The new port is opened first, because it would get the old name otherwise.

@@ -13,6 +13,7 @@ use crate::{
 };
 
 const PERIOD_NS: u64 = 1_000_000;
+pub const HEADING: &str = "time_us,event,coarse_um,lens_um,piezo_um,dac,step_edges,triggers";
 
 pub struct Csv {
     file: BufWriter<File>,
@@ -26,7 +27,7 @@ impl Csv {
         let wrong =
             |source| SimError::Io { what: format!("cannot write the trace {}", path.display()), source };
         let mut file = BufWriter::new(File::create(path).map_err(wrong)?);
-        writeln!(file, "time_us,event,coarse_um,lens_um,piezo_um,dac,step_edges,triggers").map_err(wrong)?;
+        writeln!(file, "{HEADING}").map_err(wrong)?;
         Ok(Self { file, next_ns: 0, last: String::new(), failed: None })
     }
 

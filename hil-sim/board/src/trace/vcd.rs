@@ -33,6 +33,7 @@ const SIGNALS: [(&str, u32, char, &str); 11] = [
     ("string", 1, 'o', "to_host"),
 ];
 const HAPPENS: (&str, u32, char, &str) = ("string", 1, 'h', "happens");
+pub const BEGINNING: &str = "$version farnear-sim ";
 pub const END_OF_HEADING: &str = "$enddefinitions $end";
 /// Prefixes of the heading's lines with the rig's configuration.
 pub const MADE_OF: [&str; 4] =
@@ -84,7 +85,7 @@ fn heading(config: &RigConfig, firmware: u64) -> Result<String, SimError> {
     let memory = kept.map_or(String::new(), |memory| hex(memory.as_slice()));
     let [of_firmware, of_pace, of_memory, of_scenario] = MADE_OF;
     let mut text = format!(
-        "$version farnear-sim {} $end\n{of_firmware}{firmware:016x} $end\n{of_pace}{pace} $end\n{of_memory}{memory} $end\n\
+        "{BEGINNING}{} $end\n{of_firmware}{firmware:016x} $end\n{of_pace}{pace} $end\n{of_memory}{memory} $end\n\
          {of_scenario}\n{}$end\n$timescale 1 ns $end\n$scope module rig $end\n",
         env!("CARGO_PKG_VERSION"),
         scenario.text()

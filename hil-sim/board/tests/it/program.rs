@@ -164,6 +164,33 @@ fn free_running_uses_the_first_exposure_after_settling() {
     }
 }
 
+#[test]
+fn the_camera_and_the_board_number_exposures_alike() {
+    let mut bench = Bench::new(4);
+    let free = Shot { mode: TriggerMode::FreeRunning, repeat: 3, ..fine_shot(60_000, 5_000, 100, 1_000) };
+    let triggered = |bench: &mut Bench| {
+        bench.rig.take_shots();
+        bench.arm(&[fine_shot(60_000, 4_000, 100, 1_000)]);
+        let end = bench.run();
+        assert!(matches!(end, EventKind::ProgramDone { exposures: 1, .. }), "{end:?}");
+        let reported = records(bench).last().map(|record| record.trigger_number);
+        (reported, bench.rig.take_shots().iter().map(|shot| shot.id).collect::<Vec<_>>())
+    };
+    bench.access(|rig| rig.run_camera_freely(40_000, 5_000));
+    bench.arm(&[free]);
+    let end = bench.run();
+    assert!(matches!(end, EventKind::ProgramDone { exposures: 3, .. }), "{end:?}");
+    bench.access(|rig| rig.run_camera_freely(0, 0));
+    bench.rig.advance_us(50_000).expect("runs");
+    assert_eq!(triggered(&mut bench), (Some(3), vec![3]));
+    // The number of an exposure that never came is in the status only.
+    bench.arm(&[free]);
+    let end = bench.run();
+    assert!(matches!(end, EventKind::Failed { reason: Failure::NoStrobe, .. }), "{end:?}");
+    bench.status();
+    assert_eq!(triggered(&mut bench), (Some(5), vec![5]));
+}
+
 fn records(bench: &Bench) -> Vec<ShotRecord> {
     let records = bench.events.iter().filter_map(|event| match &event.kind {
         EventKind::ShotDone { shot, .. } => Some(*shot),

@@ -29,13 +29,14 @@ pub struct Program {
 
 impl Program {
     pub fn start(arguments: &[&str]) -> Self {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_farnear-sim"))
-            .arg("run")
-            .args(arguments)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("farnear-sim starts");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_farnear-sim"));
+        command.arg("run").args(arguments);
+        Self::launch(command)
+    }
+
+    fn launch(mut command: Command) -> Self {
+        let mut child =
+            command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("farnear-sim starts");
         let mut line = String::new();
         BufReader::new(child.stdout.take().expect("piped")).read_line(&mut line).expect("text");
         let value = |key: &str| {
@@ -190,6 +191,21 @@ fn frames_at(address: &str) -> Vec<(FrameHeader, Vec<u8>)> {
     let mut camera = TcpStream::connect(address).expect("the endpoint is open");
     camera.set_read_timeout(Some(PATIENCE)).expect("a timeout");
     (0..2).map(|_| receive_frame(&mut camera)).collect()
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn nohup_lets_it_outlive_its_terminal() {
+    let mut command = Command::new("nohup");
+    command.args([env!("CARGO_BIN_EXE_farnear-sim"), "run"]);
+    let mut program = Program::launch(command);
+    let hung_up = Command::new("kill").args(["-HUP", &program.child.id().to_string()]).status();
+    assert!(hung_up.expect("kill runs").success());
+    for _ in 0..50 {
+        std::thread::sleep(Duration::from_millis(20));
+        assert_eq!(program.child.try_wait().expect("can be waited for"), None, "SIGHUP ended it");
+    }
+    assert!(program.end().success());
 }
 
 #[test]

@@ -138,3 +138,15 @@ fn reports_a_stack_overflow_by_a_large_frame() {
     };
     astray(&CODE, Alarm::StackOverflow);
 }
+
+#[test]
+fn a_board_without_power_hears_nothing() {
+    let mut bench = Bench::new(1);
+    bench.access(|rig| rig.set_power(false));
+    bench.send(&Request::Hello);
+    bench.rig.settle().expect("time does not pass for it without end");
+    bench.access(|rig| rig.set_power(true));
+    bench.rig.settle().expect("runs");
+    assert_eq!(bench.answers(), [], "of the request before");
+    assert_eq!(bench.say_hello().reset_cause, ResetCause::PowerOn);
+}

@@ -100,27 +100,15 @@ impl Client {
     }
 
     fn receive(&mut self, event: &Event) {
-        let (request, end) = match &event.kind {
-            EventKind::StillThere { .. } => {
-                self.asked = true;
-                return;
-            }
-            EventKind::Alarm(_) => {
-                self.counts.alarms += 1;
-                return;
-            }
-            EventKind::ShotDone { .. } | EventKind::FrameTaken { .. } => {
-                self.counts.exposures += 1;
-                return;
-            }
-            EventKind::Failed { request, reason, .. } => (*request, Ended::Failed(*reason)),
-            EventKind::Homed { request, .. }
-            | EventKind::MoveDone { request, .. }
-            | EventKind::ProgramDone { request, .. }
-            | EventKind::ContinuousDone { request, .. }
-            | EventKind::Calibrated { request, .. } => (*request, Ended::Done),
-            _ => return,
-        };
+        let mut end = Ended::Done;
+        match &event.kind {
+            EventKind::StillThere { .. } => self.asked = true,
+            EventKind::Alarm(_) => self.counts.alarms += 1,
+            EventKind::ShotDone { .. } | EventKind::FrameTaken { .. } => self.counts.exposures += 1,
+            EventKind::Failed { reason, .. } => end = Ended::Failed(*reason),
+            _ => {}
+        }
+        let Some(request) = event.kind.ended() else { return };
         match end {
             Ended::Done => self.counts.done += 1,
             Ended::Failed(_) | Ended::Gone => self.counts.failed += 1,

@@ -127,7 +127,7 @@ pub fn moves_unasked(case: &Case<'_>) -> Vec<Broken> {
                 close(&mut works, (*id, *boot), at_ns);
             }
             Seen::Reported { boot, event, .. } => {
-                if let Some(request) = ended(&event.kind) {
+                if let Some(request) = event.kind.ended() {
                     close(&mut works, (request, *boot), at_ns + BRAKING_NS);
                 }
             }
@@ -166,17 +166,4 @@ fn is_long(request: &Request) -> bool {
             | Request::RunContinuously { .. }
             | Request::Calibrate { .. }
     )
-}
-
-/// The request whose work ends with this event.
-pub fn ended(kind: &EventKind) -> Option<u32> {
-    match kind {
-        EventKind::Homed { request, .. }
-        | EventKind::MoveDone { request, .. }
-        | EventKind::ProgramDone { request, .. }
-        | EventKind::ContinuousDone { request, .. }
-        | EventKind::Calibrated { request, .. }
-        | EventKind::Failed { request, .. } => Some(*request),
-        _ => None,
-    }
 }

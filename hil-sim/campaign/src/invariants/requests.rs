@@ -4,7 +4,7 @@ use farnear_protocol::{
     EventKind, Request, RequestError, Response, camera::FREE_RUNNING, message::DropReason,
 };
 
-use super::{Broken, Case, motion::ended};
+use super::{Broken, Case};
 use farnear_sim::observer::{Seen, Sight};
 
 type Answer = Result<Response, RequestError>;
@@ -25,7 +25,7 @@ fn ends(case: &Case<'_>) -> Vec<Broken> {
     let mut broken = Vec::new();
     for sight in case.sights {
         let Seen::Reported { boot, event, number, .. } = &sight.seen else { continue };
-        let Some(request) = ended(&event.kind) else { continue };
+        let Some(request) = event.kind.ended() else { continue };
         // An event may be repeated with the same number only.
         let first = *ends.entry((*boot, request)).or_insert(*number);
         if first != *number {

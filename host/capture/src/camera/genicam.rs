@@ -6,7 +6,9 @@ use std::{
     sync::{
         Arc, Mutex, PoisonError,
         atomic::{AtomicBool, Ordering},
+        mpsc::channel,
     },
+    thread,
     time::{Duration, Instant},
 };
 
@@ -19,14 +21,14 @@ use farnear_protocol::{
     units::Micros,
 };
 
-use super::{
-    Camera, CameraError, Control, Frame, Image, Range, Setting, Stamp, pairing::Pairing, pixels::Layout,
-};
+use super::{Camera, CameraError, Control, Frame, Image, Setting, Stamp, pairing::Pairing, pixels::Layout};
 use crate::describe::trigger_name;
 
 const BUFFERS: usize = 16;
 const USUAL_TICKS: i64 = 1_000_000_000;
 const SOFTWARE: &str = "Software";
+/// Longest wait for a camera to stop at disconnection. Aravis repeats each request to a silent one for seconds.
+const FAREWELL: Duration = Duration::from_secs(1);
 
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct FoundCamera {
@@ -72,7 +74,8 @@ pub struct GenicamCamera {
 }
 
 impl GenicamCamera {
-    /// Opens a camera by its id from [`devices`], or the first one if empty. Fails if absent or in use.
+    /// Opens a camera by its id from [`devices`], its address or its user-defined name, or the first one if empty. Fails if
+    /// absent or in use.
     pub fn open(id: &str) -> Result<Self, CameraError> {
         let found = devices();
         let there = |found: &[FoundCamera]| {
@@ -82,14 +85,18 @@ impl GenicamCamera {
                 false => format!("it does not answer; there are {}", names.join(", ")),
             }
         };
-        let known = found.iter().any(|camera| camera.id == id) || (id.is_empty() && !found.is_empty());
-        if !known {
-            return Err(unusable(id, there(&found)));
-        }
-        let camera = aravis::Camera::new(Some(id).filter(|id| !id.is_empty())).map_err(|error| {
-            unusable(id, format!("{error}; another program may hold it, or your user may not use it (USB3 Vision: a udev rule)"))
+        let Some(first) = found.first() else { return Err(unusable(id, there(&found))) };
+        let id = if id.is_empty() { first.id.clone() } else { id.to_owned() };
+        let camera = aravis::Camera::new(Some(id.as_str())).map_err(|error| {
+            let reason = if error.matches(DeviceError::NotFound) {
+                there(&found)
+            } else if error.matches(DeviceError::Timeout) {
+                "it answers the search but no command: give it and the network card addresses in one subnet".into()
+            } else {
+                format!("{error}; another program may hold it, or your user may not use it (USB3 Vision: a udev rule)")
+            };
+            unusable(&id, reason)
         })?;
-        let id = camera.device_id().map_or_else(|_| id.to_owned(), |id| id.to_string());
         let lost = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&lost);
         let device = camera.device();
@@ -103,13 +110,14 @@ impl GenicamCamera {
         if let Some(device) = &device {
             device.connect_control_lost(move |_| flag.store(true, Ordering::Relaxed));
         }
-        let ticks = camera.integer("GevTimestampTickFrequency").ok().filter(|ticks| *ticks > 0);
+        let register = held.and_then(|device| device.timestamp_tick_frequency().ok());
+        let feature = camera.integer("GevTimestampTickFrequency").ok();
         let mut camera = Self {
             id,
             camera,
             stream: None,
             chunks: None,
-            ticks_per_second: ticks.unwrap_or(USUAL_TICKS),
+            ticks_per_second: ticks_per_second(register, feature),
             pairing: Pairing::default(),
             trigger_source: None,
             lost,
@@ -242,8 +250,10 @@ impl GenicamCamera {
                 format!("its pixel format 0x{:08x} is not read: set one of Mono8 to Mono16", format.raw()),
             )
         })?;
-        let image =
-            layout.decode(&buffer.image_data(), width, height).map_err(|bad| incomplete(bad.to_string()))?;
+        let padding = usize::try_from(buffer.image_padding().0).unwrap_or(0);
+        let image = layout
+            .decode_padded(&buffer.image_data(), width, height, padding)
+            .map_err(|bad| incomplete(bad.to_string()))?;
         Ok(Frame { image, stamp })
     }
 
@@ -260,6 +270,12 @@ impl GenicamCamera {
         let by_leader = Some(buffer.timestamp()).filter(|time| *time > 0).map(Duration::from_nanos);
         Stamp { count: Some(count), time: by_chunk.or(by_leader) }
     }
+}
+
+/// Frequency of the camera's clock. Some descriptions lack the feature; Aravis reads the leader's time by the register.
+fn ticks_per_second(register: Option<u64>, feature: Option<i64>) -> i64 {
+    let register = register.and_then(|ticks| i64::try_from(ticks).ok());
+    [register, feature].into_iter().flatten().find(|ticks| *ticks > 0).unwrap_or(USUAL_TICKS)
 }
 
 fn packets(stream: &Stream) -> String {
@@ -279,6 +295,7 @@ fn layout_of(format: PixelFormat) -> Option<Layout> {
         PixelFormat::MONO_12 => Some(Layout::Grey16 { bits: 12 }),
         PixelFormat::MONO_14 => Some(Layout::Grey16 { bits: 14 }),
         PixelFormat::MONO_16 => Some(Layout::Grey16 { bits: 16 }),
+        PixelFormat::MONO_10_PACKED => Some(Layout::GigePacked10),
         PixelFormat::MONO_12_PACKED => Some(Layout::GigePacked12),
         other if other.raw() == MONO_10P => Some(Layout::Packed10),
         other if other.raw() == MONO_12P => Some(Layout::Packed12),
@@ -305,19 +322,17 @@ impl Camera for GenicamCamera {
                 return Err(CameraError::Trigger { camera: self.kind(), mode: trigger_name(mode) });
             }
         };
+        self.steady()?;
         // Some cameras leave TriggerWidth when their exposure time is set.
         if exposure.0 > 0 && self.sets_exposure(mode) {
             self.set(&Setting::ExposureUs(f64::from(exposure.0)))?;
         }
-        self.camera.set_trigger(&source).map_err(self.failed())?;
+        self.set_trigger(&source)?;
         self.start()
     }
 
     fn sets_exposure(&mut self, mode: TriggerMode) -> bool {
-        // The bindings report success for absent features.
-        let has_mode = self.camera.is_feature_available("ExposureMode").unwrap_or(false);
-        let by_pulse =
-            has_mode && self.camera.string("ExposureMode").is_ok_and(|mode| mode.as_str() == "TriggerWidth");
+        let by_pulse = self.entry("ExposureMode").is_some_and(|mode| mode == "TriggerWidth");
         // A software trigger has no width.
         mode == TriggerMode::Software || !by_pulse
     }
@@ -355,40 +370,7 @@ impl Camera for GenicamCamera {
     }
 
     fn controls(&mut self) -> Result<Vec<Control>, CameraError> {
-        let failed = self.failed();
-        let camera = &self.camera;
-        let mut controls = Vec::new();
-        let mut add =
-            |name: &str, value: String, range| controls.push(Control { name: name.into(), value, range });
-        let numbers = [
-            (Setting::ExposureUs(0.0), camera.exposure_time()),
-            (Setting::Gain(0.0), camera.gain()),
-            (Setting::BlackLevel(0.0), camera.black_level()),
-        ];
-        for (setting, value) in numbers {
-            if let (Some(range), Ok(value)) = (self.range(&setting), value) {
-                add(setting.name(), value.to_string(), range);
-            }
-        }
-        let names = |names: Vec<aravis::glib::GString>| {
-            Range::Choice(names.iter().map(ToString::to_string).collect())
-        };
-        let formats = camera.dup_available_pixel_formats_as_strings().map_err(&failed)?;
-        add("pixel_format", camera.pixel_format_as_string().map_err(&failed)?.to_string(), names(formats));
-        let (column, row, width, height) = camera.region().map_err(&failed)?;
-        add("region", format!("{column},{row},{width},{height}"), Range::Fixed);
-        if let (Ok(source), Ok(sources)) = (camera.trigger_source(), camera.dup_available_trigger_sources()) {
-            add("trigger_source", source.to_string(), names(sources));
-        }
-        if let Ok((width, height)) = camera.sensor_size() {
-            add("sensor", format!("{width}x{height}"), Range::Fixed);
-        }
-        for (name, value) in [("vendor", camera.vendor_name()), ("model", camera.model_name())] {
-            if let Ok(value) = value {
-                add(name, value.to_string(), Range::Fixed);
-            }
-        }
-        Ok(controls)
+        self.all_controls()
     }
 
     fn set(&mut self, setting: &Setting) -> Result<(), CameraError> {
@@ -436,7 +418,35 @@ impl Camera for GenicamCamera {
 }
 
 impl Drop for GenicamCamera {
+    /// Where the camera is silent, the thread has the last reference and gives it up later.
     fn drop(&mut self) {
-        let _ = self.stop(); // a disconnected camera has no stream
+        let (camera, stream) = (self.camera.clone(), self.stream.take());
+        let (ended, end) = channel();
+        let stop = move || {
+            // A disconnected camera fails in both cases.
+            if stream.is_some() {
+                drop(stream);
+                let _ = camera.stop_acquisition();
+            } else {
+                let _ = camera.device().map(|device| device.read_register(0));
+            }
+            drop(camera);
+            let _ = ended.send(()); // the wait may be over
+        };
+        if thread::Builder::new().name("camera end".into()).spawn(stop).is_ok() {
+            let _ = end.recv_timeout(FAREWELL);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_register_gives_the_clock_of_a_description_without_it() {
+        assert_eq!(ticks_per_second(Some(125_000_000), None), 125_000_000);
+        assert_eq!(ticks_per_second(Some(0), Some(8_000_000)), 8_000_000);
+        assert_eq!(ticks_per_second(None, Some(0)), USUAL_TICKS);
     }
 }

@@ -347,7 +347,7 @@ fn mispaired(camera: &str, shot: &ShotRecord, reason: String) -> CameraError {
 }
 
 /// Signed advance of a count. Short counts wrap, and half of one exceeds any delay.
-fn counted(from: u64, to: u64) -> i64 {
+pub fn counted(from: u64, to: u64) -> i64 {
     let way = i128::from(to) - i128::from(from);
     let around = i128::from(SHORT_COUNT_MAX);
     let way = match from.max(to) <= SHORT_COUNT_MAX {

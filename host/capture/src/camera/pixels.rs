@@ -22,7 +22,9 @@ pub enum Layout {
     Packed10,
     /// Twelve bits per pixel, LSB first: Mono12p.
     Packed12,
-    /// Two 12-bit pixels in three bytes: Mono12Packed; the middle byte has the low bits of both.
+    /// Two 10-bit pixels in three bytes: Mono10Packed; the middle byte has the low bits of both.
+    GigePacked10,
+    /// As [`Self::GigePacked10`] with 12-bit pixels: Mono12Packed.
     GigePacked12,
     /// Two pixels in four bytes, luma first: YUYV, yuyv422.
     Yuyv,
@@ -68,7 +70,7 @@ impl Layout {
     pub fn bits(self) -> u8 {
         match self {
             Self::Grey16 { bits } => bits,
-            Self::Packed10 => 10,
+            Self::Packed10 | Self::GigePacked10 => 10,
             Self::Packed12 | Self::GigePacked12 => 12,
             Self::Grey8 { .. } | Self::Yuyv | Self::Jpeg => 8,
         }
@@ -87,7 +89,9 @@ impl Layout {
             Self::Grey8 { .. } => pixels.checked_mul(3),
             Self::Grey16 { .. } | Self::Yuyv => pixels.checked_mul(2),
             Self::Packed10 => Some(pixels.checked_mul(10)?.div_ceil(8)),
-            Self::Packed12 | Self::GigePacked12 => Some(pixels.checked_mul(12)?.div_ceil(8)),
+            Self::Packed12 | Self::GigePacked10 | Self::GigePacked12 => {
+                Some(pixels.checked_mul(12)?.div_ceil(8))
+            }
             Self::Jpeg => None,
         }
     }
@@ -97,7 +101,7 @@ impl Layout {
         match self {
             Self::Grey8 { .. } => Some(width),
             Self::Grey16 { .. } | Self::Yuyv => width.checked_mul(2),
-            Self::Packed10 | Self::Packed12 | Self::GigePacked12 | Self::Jpeg => None,
+            Self::Packed10 | Self::Packed12 | Self::GigePacked10 | Self::GigePacked12 | Self::Jpeg => None,
         }
     }
 
@@ -130,6 +134,26 @@ impl Layout {
         Ok(rows.concat())
     }
 
+    /// As [`Self::decode`] with `padding` bytes after each row.
+    pub fn decode_padded(
+        self,
+        bytes: &[u8],
+        width: usize,
+        height: usize,
+        padding: usize,
+    ) -> Result<Image, BadFrame> {
+        if padding == 0 {
+            return self.decode(bytes, width, height);
+        }
+        let row = self.row_bytes(width).ok_or_else(|| {
+            BadFrame(format!(
+                "{padding} bytes after each row of a packed format: set one of whole bytes (Mono8, Mono10, Mono12, Mono16)"
+            ))
+        })?;
+        let rows = self.without_padding(bytes, width, height, row.saturating_add(padding))?;
+        self.decode(&rows, width, height)
+    }
+
     /// Decodes a frame; surplus bytes are ignored. Fails for too few bytes, values above the bit depth, or a bad JPEG.
     pub fn decode(self, bytes: &[u8], width: usize, height: usize) -> Result<Image, BadFrame> {
         if self == Self::Jpeg {
@@ -151,7 +175,8 @@ impl Layout {
             Self::Yuyv => bytes[..due].iter().step_by(2).map(|byte| u16::from(*byte)).collect(),
             Self::Packed10 => bit_stream(bytes, pixels, 10),
             Self::Packed12 => bit_stream(bytes, pixels, 12),
-            Self::GigePacked12 => gige_packed_12(bytes, pixels),
+            Self::GigePacked10 => gige_packed(bytes, pixels, 2),
+            Self::GigePacked12 => gige_packed(bytes, pixels, 4),
             Self::Jpeg => Vec::new(),
         };
         let bits = self.bits();
@@ -181,16 +206,17 @@ fn bit_stream(bytes: &[u8], pixels: usize, bits: u32) -> Vec<u16> {
         .collect()
 }
 
-fn gige_packed_12(bytes: &[u8], pixels: usize) -> Vec<u16> {
+/// Two pixels in three bytes: the upper eight bits outside, the `low` other ones in a half of the middle byte.
+fn gige_packed(bytes: &[u8], pixels: usize, low: u32) -> Vec<u16> {
     (0..pixels)
         .map(|index| {
             let group = index / 2 * 3;
             let middle = bytes.get(group + 1).copied().unwrap_or(0);
-            let (high, low) = match index % 2 {
-                0 => (bytes[group], middle & 0xf),
+            let (high, half) = match index % 2 {
+                0 => (bytes[group], middle),
                 _ => (bytes[group + 2], middle >> 4),
             };
-            u16::from(high) << 4 | u16::from(low)
+            (u16::from(high) << low) | (u16::from(half) & ((1 << low) - 1))
         })
         .collect()
 }
@@ -242,6 +268,9 @@ mod tests {
         assert_eq!(Layout::Packed12.decode(&bytes, 2, 1).unwrap().pixels, array![[0xabc, 0x123]]);
         let bytes = [0xab, 0x3c, 0x12];
         assert_eq!(Layout::GigePacked12.decode(&bytes, 2, 1).unwrap().pixels, array![[0xabc, 0x123]]);
+        // Mono10Packed uses two bits of each half.
+        let bytes = [0xab, 0xde, 0x12];
+        assert_eq!(Layout::GigePacked10.decode(&bytes, 2, 1).unwrap().pixels, array![[0x2ae, 0x049]]);
         // 0x155, 0x2aa, 0x3ff, 0x001 in forty bits, LSB first.
         let bytes = [0x55, 0xa9, 0xfa, 0x7f, 0x00];
         assert_eq!(Layout::Packed10.decode(&bytes, 4, 1).unwrap().pixels, array![[0x155, 0x2aa, 0x3ff, 1]]);
@@ -277,12 +306,17 @@ mod tests {
         assert_eq!(y16.without_padding(&padded, 2, 2, 6).unwrap(), [1, 0, 2, 0, 3, 0, 4, 0]);
         assert!(y16.without_padding(&padded, 2, 3, 6).is_err());
         assert_eq!(Layout::Yuyv.without_padding(&[1, 2, 3, 4], 2, 1, 4).unwrap(), [1, 2, 3, 4]);
+        assert_eq!(y16.decode_padded(&padded, 2, 2, 2).unwrap().pixels, array![[1, 2], [3, 4]]);
+        assert_eq!(y16.decode_padded(&padded, 2, 2, 0).unwrap().pixels, array![[1, 2], [99 * 257, 3]]);
+        let packed = Layout::Packed12.decode_padded(&[0; 12], 2, 2, 3).unwrap_err().to_string();
+        assert!(packed.contains("3 bytes after each row"), "{packed}");
     }
 
     fn any_layout() -> impl Strategy<Value = Layout> {
         prop_oneof![
             Just(Layout::Packed10),
             Just(Layout::Packed12),
+            Just(Layout::GigePacked10),
             Just(Layout::GigePacked12),
             Just(Layout::Yuyv),
             Just(Layout::Jpeg),

@@ -23,13 +23,13 @@ use super::{Camera, CameraError, Frame as Picture, Image, Stamp};
 
 const CONNECT: Duration = Duration::from_secs(5);
 /// Longest wait for the simulator to end the stream at disconnection.
-const FAREWELL: Duration = Duration::from_secs(1);
+const FAREWELL: Duration = Duration::from_millis(500);
 /// Image queue; a full queue blocks the sender and bounds the memory.
 const QUEUE: usize = 8;
 /// Minimum gap of free-running exposures: read-out and a margin.
 const BETWEEN_EXPOSURES_US: u32 = 15_000;
-/// Tolerance between strobe and reported exposure start.
-const SAME_MOMENT_US: u64 = 50;
+/// Tolerance between strobe and reported exposure start: the board accepts one that has lost 300 us of a second.
+const SAME_MOMENT_US: u64 = 300;
 const WATCH_EXPOSURE: Micros = Micros(5_000);
 const STREAM_ENDED: &str = "the stream has ended";
 
@@ -220,10 +220,13 @@ impl Camera for SimCamera {
                 };
             let FrameHeader { shot_id, exposure, .. } = frame.header;
             let later = if exposure.0.abs_diff(shot.strobe_start.0) <= SAME_MOMENT_US {
-                // The simulator numbers only exposures by the trigger line, the board also others.
+                // The simulator does not know the number of an exposure that failed without a trigger.
                 0
             } else if shot_id == FREE_RUNNING {
                 if exposure < shot.strobe_start { -1 } else { 1 }
+            } else if shot_id == wanted {
+                // From before a reset of the board, which numbers from 0 again.
+                -1
             } else {
                 shot_id.wrapping_sub(wanted) as i32
             };

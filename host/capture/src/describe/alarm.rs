@@ -2,6 +2,10 @@ use farnear_protocol::message::{Alarm, AlarmRecord, Failure};
 
 use super::{SLOW_READOUT, axis_name, record_name, um};
 
+/// Remedy for a motor that does not follow its steps.
+const STALLED: &str = "free the stage and home it again; if the first move fails, compare microsteps, encoder counts and wires \
+                       with docs/rig.md";
+
 pub fn alarm_text(alarm: Alarm) -> String {
     match alarm {
         Alarm::EmergencyStop => "the emergency stop was pressed; release it".into(),
@@ -11,7 +15,7 @@ pub fn alarm_text(alarm: Alarm) -> String {
             axis_name(axis)
         ),
         Alarm::Following { axis, error } => format!(
-            "encoder and steps of the {} disagree by {:.3} um (stall or slip); free the stage and home it again",
+            "encoder and steps of the {} disagree by {:.3} um (stall or slip); {STALLED}",
             axis_name(axis),
             um(error)
         ),
@@ -24,7 +28,7 @@ pub fn alarm_text(alarm: Alarm) -> String {
             axis_name(axis)
         ),
         Alarm::Gauge => {
-            "the piezo's strain gauge gives nonsense, or the piezo does not follow; check cables and amplifier, and if its flexure has a second mode: `farnear rig settings set piezo_second_mode 1`".into()
+            "the piezo's strain gauge gives nonsense, or the piezo does not follow; check cables, amplifier and the gauge's scale, and if its flexure has a second mode: `farnear rig settings set piezo_second_mode 1`".into()
         }
         Alarm::HostSilence { request } => {
             format!("the host said nothing for as long as request {request} had allowed; was the cable pulled?")
@@ -65,7 +69,7 @@ pub fn failure_text(reason: Failure, alarm: Option<&AlarmRecord>) -> String {
         Failure::FarSwitch => "the far switch closed; the stage ran past its travel, home it again".into(),
         Failure::HomeSwitch => "the home switch closed where it should not; home again".into(),
         Failure::Following { error } => format!(
-            "encoder and steps disagree by {:.3} um (stall or slip); free the stage and home it again",
+            "encoder and steps disagree by {:.3} um (stall or slip); {STALLED}",
             um(error)
         ),
         Failure::NotSettled { error } => {
@@ -83,11 +87,30 @@ pub fn failure_text(reason: Failure, alarm: Option<&AlarmRecord>) -> String {
             None => format!("alarm {number} stopped it"),
         },
         Failure::Implausible => {
-            "the readings contradict each other, so nothing was stored; is something loose or shaking?".into()
+            "the readings contradict each other or lie outside the settings' ranges (`farnear rig settings list`), so nothing was stored; is something loose or shaking, or is the part another one?".into()
         }
     };
     match alarm {
         Some(record) => format!("{text}; alarm {} is latched", record.number),
         None => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn failures_name_the_settings_and_parts_that_may_cause_them() {
+        let error = farnear_protocol::Nanometres(12_500);
+        for (reason, cause) in [
+            (Failure::Implausible, "farnear rig settings list"),
+            (Failure::NoStrobe, "strobe_deadline_us"),
+            (Failure::Following { error }, "microsteps"),
+            (Failure::Gauge, "the gauge's scale"),
+        ] {
+            let text = failure_text(reason, None);
+            assert!(text.contains(cause), "{text}");
+        }
     }
 }

@@ -26,7 +26,11 @@ pub fn refusal_text(error: &RequestError) -> String {
             format!("more than {outstanding} requests wait for their answers: ask again")
         }
         RequestError::Period { min } => {
-            format!("the camera takes {} us for an exposure and its read-out; ask for a longer period", min.0)
+            format!(
+                "the camera takes {} us for an exposure and its read-out; ask for a longer period, or set camera_readout_us for a \
+                 faster camera",
+                min.0
+            )
         }
         RequestError::Light { reason } => format!("the light: {}", light_fault_text(*reason)),
         RequestError::OutOfRange { axis, asked, min, max } => format!(
@@ -95,7 +99,9 @@ fn shot_fault_text(fault: ShotFault) -> &'static str {
         ShotFault::Index => "the index is outside the program, or the program has no shots",
         ShotFault::Missing => "it was never loaded",
         ShotFault::Exposure => "the exposure time is outside the board's limits",
-        ShotFault::Settle => "the settle window or its time is not possible",
+        ShotFault::Settle => {
+            "expected a settle window of 1 to 100000 nm, and a dwell in it of 1 to 1000000 us"
+        }
         ShotFault::Repeat => "the repeat count is 0",
     }
 }
@@ -126,5 +132,20 @@ fn light_fault_text(reason: LightFault) -> String {
             "the flash does not end within the exposure; shorten its delay or its length".into()
         }
         LightFault::Mode => "only a shot that the board triggers can have a flash".into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use farnear_protocol::Micros;
+
+    use super::*;
+
+    #[test]
+    fn refusals_name_what_can_be_changed() {
+        let period = refusal_text(&RequestError::Period { min: Micros(11_000) });
+        assert!(period.contains("camera_readout_us"), "{period}");
+        let settle = refusal_text(&RequestError::Shot { index: 3, reason: ShotFault::Settle });
+        assert!(settle.starts_with("shot 3: ") && settle.contains("100000 nm"), "{settle}");
     }
 }

@@ -9,7 +9,7 @@ use std::{
         atomic::{AtomicBool, Ordering},
     },
     thread,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use farnear_capture::camera::{Camera, CameraError, FolderCamera, Image, SimCamera};
@@ -70,7 +70,12 @@ fn reads_new_images_in_order_and_waits_for_incomplete_ones() {
 }
 
 fn send(stream: &mut TcpStream, shot_id: u32) {
-    send_at(stream, shot_id, 1_000_000);
+    send_at(stream, shot_id, exposed(shot_id).strobe_start.0);
+}
+
+/// At the moment of [`send`]'s image.
+fn exposed(trigger_number: u32) -> ShotRecord {
+    ShotRecord { strobe_start: BoardMicros(20_000 * u64::from(trigger_number)), ..shot(trigger_number) }
 }
 
 fn send_at(stream: &mut TcpStream, shot_id: u32, board_us: u64) {
@@ -99,12 +104,21 @@ fn endpoint(shots: &'static [u32], trailing: &'static [u8]) -> String {
 fn the_simulators_images_are_matched_to_their_exposures() {
     let mut camera = SimCamera::connect(&endpoint(&[3, 4, 5, 7], &[])).unwrap();
     let wait = Duration::from_secs(20);
-    assert_eq!(camera.image(&shot(4), wait).unwrap().pixels[[0, 0]], 4);
-    assert_eq!(camera.image(&shot(5), wait).unwrap().pixels[[0, 1]], 255);
-    let skipped = camera.image(&shot(6), wait).unwrap_err();
+    assert_eq!(camera.image(&exposed(4), wait).unwrap().pixels[[0, 0]], 4);
+    assert_eq!(camera.image(&exposed(5), wait).unwrap().pixels[[0, 1]], 255);
+    let skipped = camera.image(&exposed(6), wait).unwrap_err();
     assert!(matches!(skipped, CameraError::Skipped { wanted: 6, came: 7 }), "{skipped:?}");
-    let late = camera.image(&shot(8), Duration::from_millis(30)).unwrap_err();
+    let late = camera.image(&exposed(8), Duration::from_millis(30)).unwrap_err();
     assert!(matches!(late, CameraError::Late { .. }), "{late:?}");
+}
+
+#[test]
+fn a_simulator_that_stands_still_is_left_at_once() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let camera = SimCamera::connect(&listener.local_addr().unwrap().to_string()).unwrap();
+    let begin = Instant::now();
+    drop(camera);
+    assert!(begin.elapsed() < Duration::from_millis(900), "{:?}", begin.elapsed());
 }
 
 #[test]
@@ -114,12 +128,24 @@ fn arming_drops_images_from_before_a_reset_of_the_board() {
     let (mut simulator, _) = listener.accept().unwrap();
     let wait = Duration::from_secs(20);
     send(&mut simulator, 7);
-    let skipped = camera.image(&shot(6), wait).unwrap_err();
+    let skipped = camera.image(&exposed(6), wait).unwrap_err();
     assert!(matches!(skipped, CameraError::Skipped { wanted: 6, came: 7 }), "{skipped:?}");
     // Its triggers count from 0 again.
     camera.arm(TriggerMode::Hardware, Micros(1)).unwrap();
     send(&mut simulator, 0);
-    assert_eq!(camera.image(&shot(0), wait).unwrap().pixels[[0, 0]], 0);
+    assert_eq!(camera.image(&exposed(0), wait).unwrap().pixels[[0, 0]], 0);
+}
+
+#[test]
+fn an_image_of_the_same_number_from_before_a_reset_is_passed_over() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let mut camera = SimCamera::connect(&listener.local_addr().unwrap().to_string()).unwrap();
+    let (mut simulator, _) = listener.accept().unwrap();
+    send_at(&mut simulator, 2, 7_000_000);
+    let late = camera.image(&exposed(2), Duration::from_millis(300)).unwrap_err();
+    assert!(matches!(late, CameraError::Late { .. }), "{late:?}");
+    send(&mut simulator, 2);
+    camera.image(&exposed(2), Duration::from_secs(20)).unwrap();
 }
 
 #[test]

@@ -2,11 +2,13 @@
 //! the pixel in column x, row y of frame n is (x + y + n) mod 255 at 10 ms exposure without gain.
 
 use std::{
+    io::Write,
     process::{Child, Command, Stdio},
     sync::{Mutex, MutexGuard, PoisonError},
     time::{Duration, Instant},
 };
 
+use aravis::prelude::*;
 use farnear_capture::camera::{
     Camera, CameraError, Frame, GenicamCamera, Setting, genicam,
     pairing::{Belongs, Pairing},
@@ -22,6 +24,9 @@ const WAIT: Duration = Duration::from_secs(20);
 /// Exposure for full contrast.
 const EXPOSURE: Micros = Micros(10_000);
 const NUMBERS: u64 = 255;
+/// Of the fake camera, for FrameStart.
+const TRIGGER_SOURCE: u64 = 0x304;
+const ID: &str = "Aravis-Fake-GV01";
 /// Scheduling delay: the fake camera stamps frames in its own process.
 const SCHEDULING: Duration = Duration::from_secs(15);
 
@@ -35,9 +40,14 @@ struct Fake {
 
 impl Fake {
     fn start(lost_per_thousand: u32) -> Self {
+        Self::with(&["-r", &lost_per_thousand.to_string()])
+    }
+
+    fn with(arguments: &[&str]) -> Self {
         let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
         let child = Command::new("arv-fake-gv-camera-0.8")
-            .args(["-i", "lo", "-s", "GV01", "-r", &lost_per_thousand.to_string()])
+            .args(["-i", "lo", "-s", ID.trim_start_matches("Aravis-Fake-")])
+            .args(arguments)
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()
@@ -48,11 +58,16 @@ impl Fake {
     fn open(&self) -> GenicamCamera {
         let until = Instant::now() + WAIT;
         loop {
-            match GenicamCamera::open("Aravis-Fake-GV01") {
+            match GenicamCamera::open(ID) {
                 Ok(camera) => return camera.with_jitter(SCHEDULING),
                 Err(error) => assert!(Instant::now() < until, "{error}"),
             }
         }
+    }
+
+    fn signal(&self, signal: &str) {
+        let sent = Command::new("kill").args([signal, &self.child.id().to_string()]).status();
+        assert!(sent.unwrap().success(), "{signal}");
     }
 
     fn kill(&mut self) {
@@ -66,6 +81,38 @@ impl Drop for Fake {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
+}
+
+/// The fake camera with text before some parts of its description, for features of real cameras.
+fn described(changes: &[(&str, &str)]) -> (Fake, tempfile::NamedTempFile) {
+    let mut text = {
+        let usual = Fake::start(0);
+        drop(usual.open());
+        let camera = aravis::Camera::new(Some(ID)).unwrap();
+        camera.device().unwrap().genicam_xml().0.to_string()
+    };
+    for (part, before) in changes {
+        assert!(text.contains(part), "{part}");
+        text = text.replacen(part, &format!("{before}{part}"), 1);
+    }
+    let mut file = tempfile::NamedTempFile::new().unwrap();
+    file.write_all(text.as_bytes()).unwrap();
+    let fake = Fake::with(&["-g", file.path().to_str().unwrap()]);
+    drop(fake.open()); // waits until it answers
+    (fake, file)
+}
+
+fn number(name: &str, address: u32, min: f64) -> String {
+    format!(
+        "<Float Name=\"{name}\"><pValue>{name}Register</pValue><Min>{min}</Min><Max>24</Max></Float>\
+         <FloatReg Name=\"{name}Register\"><Address>{address}</Address><Length>4</Length><AccessMode>RW</AccessMode>\
+         <pPort>Device</pPort><Endianess>BigEndian</Endianess></FloatReg>"
+    )
+}
+
+fn values<const N: usize>(camera: &mut GenicamCamera, names: [&str; N]) -> [Option<String>; N] {
+    let controls = camera.controls().unwrap();
+    names.map(|name| controls.iter().find(|control| control.name == name).map(|c| c.value.clone()))
 }
 
 fn drawn(pixels: &ndarray::Array2<u16>) -> u64 {
@@ -86,7 +133,7 @@ fn discovers_describes_configures_and_watches_the_camera() {
     let fake = Fake::start(0);
     let mut camera = fake.open();
     let found = genicam::devices();
-    assert!(found.iter().any(|found| found.id == "Aravis-Fake-GV01"), "{found:?}");
+    assert!(found.iter().any(|found| found.id == ID), "{found:?}");
     camera.set(&Setting::ExposureUs(f64::from(EXPOSURE.0))).unwrap();
     camera.set(&Setting::Region([0, 0, 128, 64])).unwrap();
     let controls = camera.controls().unwrap();
@@ -98,6 +145,7 @@ fn discovers_describes_configures_and_watches_the_camera() {
         (Setting::PixelFormat("Mono13".into()), "Mono16"),
         (Setting::Region([0, 0, 5000, 5000]), "sensor's"),
         (Setting::TriggerSource("Line77".into()), "Software"),
+        (Setting::Gain(3.7), "made 3 of it"),
     ] {
         let error = camera.set(&setting).unwrap_err();
         assert!(
@@ -105,13 +153,67 @@ fn discovers_describes_configures_and_watches_the_camera() {
             "{error}"
         );
     }
+    // The camera keeps what it made of 3.7, and multiplies its pixels by it.
+    camera.set(&Setting::Gain(0.0)).unwrap();
     camera.watch().unwrap();
     let (first, second) = (next(&mut camera), next(&mut camera));
     assert_eq!((first.image.pixels.dim(), first.image.bits), ((64, 128), 8));
     assert!(second.stamp.time > first.stamp.time, "{:?} {:?}", first.stamp, second.stamp);
     assert_eq!(drawn(&second.image.pixels), second.stamp.count.unwrap() % NUMBERS);
     let absent = GenicamCamera::open("Nobody-1").err().unwrap().to_string();
-    assert!(absent.contains("Nobody-1") && absent.contains("Aravis-Fake-GV01"), "{absent}");
+    assert!(absent.contains("Nobody-1") && absent.contains(ID), "{absent}");
+    drop(camera);
+    GenicamCamera::open("127.0.0.1").unwrap();
+}
+
+#[test]
+#[cfg_attr(not(fake_gige_camera), ignore = "needs arv-fake-gv-camera-0.8")]
+fn arming_ends_automatics_and_gamma_and_keeps_the_falling_edge() {
+    let edge = "<EnumEntry Name=\"FallingEdge\"><Value>1</Value></EnumEntry>";
+    let (fake, _file) = described(&[
+        ("<pValue>TriggerActivationRegister</pValue>", edge),
+        ("<Enumeration Name=\"GainAuto\"", &number("Gamma", 0x8000, 0.1)),
+    ]);
+    let other = aravis::Camera::new(Some(ID)).unwrap();
+    for (name, entry) in
+        [("GainAuto", "Continuous"), ("TriggerSelector", "FrameStart"), ("TriggerActivation", "FallingEdge")]
+    {
+        other.set_string(name, entry).unwrap();
+    }
+    other.set_float("Gamma", 0.5).unwrap();
+    drop(other);
+    let mut camera = fake.open();
+    let names = ["GainAuto", "Gamma", "TriggerActivation"];
+    let all = |values: [&str; 3]| values.map(|value| Some(value.to_owned()));
+    assert_eq!(values(&mut camera, names), all(["Continuous", "0.5", "FallingEdge"]));
+    camera.arm(TriggerMode::Software, EXPOSURE).unwrap();
+    assert_eq!(values(&mut camera, names), all(["Off", "1", "FallingEdge"]));
+}
+
+#[test]
+#[cfg_attr(not(fake_gige_camera), ignore = "needs arv-fake-gv-camera-0.8")]
+fn negative_gains_steps_and_values_without_a_name() {
+    let column = "OffsetX\"><pValue>OffsetXRegister</pValue><Min>0</Min><Max>512</Max><Inc>4</Inc></Integer>\
+                  <Integer Name=\"Old";
+    let (fake, _file) = described(&[
+        ("<Enumeration Name=\"GainAuto\"", &number("Gain", 0x8010, -5.0)),
+        ("OffsetX\" NameSpace=\"Standard\"", column),
+    ]);
+    let mut camera = fake.open();
+    camera.set(&Setting::Gain(-2.5)).unwrap();
+    camera.set(&Setting::Region([4, 0, 128, 64])).unwrap();
+    let refused = camera.set(&Setting::Region([3, 0, 128, 64])).unwrap_err().to_string();
+    assert!(refused.contains("expected a column from 0 px in steps of 4 px"), "{refused}");
+    let names = ["gain", "region", "trigger_source"];
+    let [gain, region, source] = values(&mut camera, names);
+    assert_eq!((gain.as_deref(), region.as_deref()), (Some("-2.5"), Some("4,0,128,64")));
+    assert!(source.is_some());
+    drop(camera);
+    let other = aravis::Camera::new(Some(ID)).unwrap();
+    other.set_string("TriggerSelector", "FrameStart").unwrap();
+    other.device().unwrap().write_register(TRIGGER_SOURCE, 99).unwrap();
+    drop(other);
+    assert_eq!(values(&mut fake.open(), names)[2], None);
 }
 
 #[test]
@@ -225,6 +327,26 @@ fn reports_lost_packets_and_never_returns_another_exposures_frame() {
         "{frames} exposures: {paired} paired, {incomplete} reported incomplete, {passed_over} passed over"
     );
     assert!(paired > frames / 2 && incomplete > 0, "{paired} {incomplete}");
+}
+
+#[test]
+#[cfg_attr(not(fake_gige_camera), ignore = "needs arv-fake-gv-camera-0.8")]
+fn a_frozen_camera_is_left_at_once() {
+    let fake = Fake::start(0);
+    for watches in [true, false] {
+        let mut camera = fake.open();
+        if watches {
+            camera.watch().unwrap();
+            next(&mut camera);
+        }
+        fake.signal("-STOP");
+        let begin = Instant::now();
+        drop(camera);
+        let took = begin.elapsed();
+        fake.signal("-CONT");
+        // Aravis alone takes 3 s and more.
+        assert!(took < Duration::from_secs(2), "{took:?}, watches: {watches}");
+    }
 }
 
 #[test]

@@ -259,6 +259,19 @@ fn reports_a_board_that_dies_during_a_move() {
 }
 
 #[test]
+fn an_emulated_board_that_stands_still_is_asked_once_with_repeats() {
+    let peer = Peer::new(Faults { never_ends: true, ..Faults::default() });
+    peer.board().hello.emulated = true;
+    let client = Client::connect(peer.connect(), "scripted").unwrap();
+    client.set_timing(Timing { work_slack: Duration::from_secs(3600), ..SHORT });
+    let work = client.start_home(Axis::SensorCoarse).unwrap();
+    peer.board().faults.lose_requests = u32::MAX;
+    let error = work.homed().err().unwrap();
+    assert!(matches!(error, ClientError::Silent { attempts: 4, .. }), "{error:?}");
+    assert!(error.to_string().contains("Ctrl-Z"), "{error}");
+}
+
+#[test]
 fn closes_the_old_port_before_searching_the_board() {
     let peer = Peer::new(Faults { never_ends: true, ..Faults::default() });
     let mut client = Client::connect(peer.connect(), "scripted").unwrap();

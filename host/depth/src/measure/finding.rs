@@ -91,8 +91,8 @@ impl fmt::Display for Finding {
             Self::Unexplained { left_over, psf, max_blur_px } => write!(
                 f,
                 "the model leaves {:.1} % of the detail unexplained (usual is below 2): is the PSF {psf} with a blur of up to \
-                 {max_blur_px:.3} px right? farnear calibrate psf finds it. Another black level in one \
-                 image and hot pixels (farnear calibrate camera) do the same",
+                 {max_blur_px:.3} px right? farnear calibrate psf finds it. A tone curve (sRGB, a camera's JPEG), another black level \
+                 in one image and hot pixels (farnear calibrate camera) do the same",
                 100.0 * left_over.sqrt()
             ),
             Self::EquallySharp => f.write_str(

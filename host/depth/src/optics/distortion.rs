@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::OpticsError;
+use super::{OpticsError, binned_place};
 
 /// OpenCV's supported coefficient counts; its models of 12 and 14 (thin prism, tilted sensor) are not.
 const COUNTS: [usize; 3] = [4, 5, 8];
@@ -52,10 +52,10 @@ impl DistortionSection {
 }
 
 impl Distortion {
-    /// The same lens for images with `bin` x `bin` pixels averaged into one; the first pixel's centre is at 0.
+    /// The same lens for images with `bin` x `bin` pixels averaged into one.
     pub(super) fn binned(self, bin: f64) -> Self {
         let focal_px = self.focal_px.map(|focal| focal / bin);
-        let centre_px = self.centre_px.map(|centre| (centre + 0.5) / bin - 0.5);
+        let centre_px = self.centre_px.map(|centre| binned_place(centre, bin));
         Self { focal_px, centre_px, ..self }
     }
 

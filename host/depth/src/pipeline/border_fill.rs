@@ -54,19 +54,44 @@ pub(crate) fn fill(map: &mut DepthMap, width_px: usize) {
     }
 }
 
-/// Values of the nearest inner pixels in the border of `width_px` pixels, where it has values.
-pub(crate) fn extend(map: &mut Array2<f32>, width_px: usize) {
-    let (height, width) = map.dim();
+/// Calls `each` with every border pixel and the nearest inner one.
+fn each_of_border(
+    (height, width): (usize, usize),
+    width_px: usize,
+    mut each: impl FnMut((usize, usize), (usize, usize)),
+) {
     let inner = |i: usize, n: usize| i.clamp(width_px.min((n - 1) / 2), n - 1 - width_px.min((n - 1) / 2));
     for y in 0..height {
         let row = inner(y, height);
         let beside = if row == y { inner(0, width) } else { width };
         for x in (0..beside).chain((width - beside).max(beside)..width) {
-            if !map[(y, x)].is_nan() {
-                map[(y, x)] = map[(row, inner(x, width))];
-            }
+            each((y, x), (row, inner(x, width)));
         }
     }
+}
+
+/// Values of the nearest inner pixels in the border of `width_px` pixels, where it has values.
+pub(crate) fn extend(map: &mut Array2<f32>, width_px: usize) {
+    each_of_border(map.dim(), width_px, |at, from| {
+        if !map[at].is_nan() {
+            map[at] = map[from];
+        }
+    });
+}
+
+/// Widens the deviations of border pixels by what the surface may do between them and the nearest inner pixel: as
+/// much as over the same distance on its other side.
+pub(crate) fn widen(deviation_mm: &mut Array2<f32>, depth_mm: &Array2<f32>, width_px: usize) {
+    let size = deviation_mm.dim();
+    // As far on the other side; at most to the opposite border of a small map.
+    let mirrored = |at: usize, from: usize, n: usize| (2 * from).saturating_sub(at).min(n - 1);
+    each_of_border(size, width_px, |at, from| {
+        let mirror = (mirrored(at.0, from.0, size.0), mirrored(at.1, from.1, size.1));
+        let apart = depth_mm[from] - depth_mm[mirror];
+        if apart.is_finite() {
+            deviation_mm[at] = deviation_mm[at].hypot(apart);
+        }
+    });
 }
 
 fn take(depth: &mut f32, confidence: &mut f32, from_depth: f32, from_confidence: f32) {
@@ -99,6 +124,21 @@ mod tests {
         assert_eq!(map.depth_mm[(19, 29)], 1222.0);
         assert_eq!((map.depth_mm[(10, 3)], map.confidence[(10, 3)]), (1007.0, 0.4));
         assert_eq!((map.depth_mm[(7, 7)], map.confidence[(12, 22)]), (707.0, 0.8));
+    }
+
+    #[test]
+    fn deviations_of_the_border_grow_with_the_slope() {
+        let mut depth_mm = map(20, 30).depth_mm;
+        depth_mm[(12, 8)] = f32::NAN;
+        let mut deviation_mm = Array2::from_elem((20, 30), 0.5);
+        deviation_mm[(0, 29)] = f32::NAN;
+        widen(&mut deviation_mm, &depth_mm, 4);
+        // Depth rises by 1 a column and by 100 a row.
+        assert_eq!(deviation_mm[(10, 0)], 0.5_f32.hypot(4.0));
+        assert_eq!(deviation_mm[(10, 28)], 0.5_f32.hypot(3.0));
+        assert!((deviation_mm[(1, 10)] - 300.0).abs() < 0.1);
+        assert_eq!([deviation_mm[(10, 15)], deviation_mm[(12, 0)]], [0.5; 2]);
+        assert!(deviation_mm[(0, 29)].is_nan());
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //! small among the hundreds of pixels for a depth. A clipped highlight is unchanged: its value is a lower bound, and
 //! its neighbours are darker. A patch becomes a hole (NaN), which removes all depths that depend on it.
 
-use ndarray::{Array2, ArrayView2, Axis};
+use ndarray::{Array2, ArrayView2, Axis, s};
 
 use crate::confidence;
 use crate::reason::Reason;
@@ -29,6 +29,25 @@ pub(crate) fn usual_magnitude(image: ArrayView2<f32>) -> Option<f32> {
     let place = sizes.len().checked_sub(2 + sizes.len() / 1000)?;
     let usual = *sizes.select_nth_unstable_by(place, f32::total_cmp).1;
     (usual > 0.0).then_some(usual)
+}
+
+/// Takes the values of wild pixels from an image of floats, single or in small groups: NaN remains. A spot of light on black is larger.
+pub fn erase_wild(image: &mut Array2<f32>) {
+    let wild = usual_magnitude(image.view()).map_or(f32::INFINITY, |usual| WILD * usual);
+    let is_wild = |value: &f32| value.is_finite() && value.abs() >= wild;
+    let (height, width) = image.dim();
+    let reach = NEIGHBOURHOOD_PX as usize;
+    let around = |at: usize, size: usize| at.saturating_sub(reach)..(at + reach + 1).min(size);
+    let is_alone = |(y, x): (usize, usize)| {
+        let near = image.slice(s![around(y, height), around(x, width)]);
+        near.iter().filter(|value| is_wild(value)).count() <= ALONE
+    };
+    let found: Vec<(usize, usize)> = image
+        .indexed_iter()
+        .filter(|(at, value)| is_wild(value) && is_alone(*at))
+        .map(|(at, _)| at)
+        .collect();
+    found.iter().for_each(|at| image[*at] = f32::NAN);
 }
 
 /// Level at which an image is clipped: the brightest 3x3 patch of one value, if only hot pixels are brighter. A camera
@@ -231,6 +250,22 @@ mod tests {
         // Black with a few bright pixels.
         let sparse = Array2::from_shape_fn((60, 80), |at| if at == (30, 40) { 5000.0 } else { 0.0 });
         assert!(find(sparse.view(), None, None).is_none());
+    }
+
+    #[test]
+    fn wild_values_lose_their_pixels_and_bright_spots_stay() {
+        let scene = |y: usize, x: usize| 0.3 + ((y * 7 + x * 13) % 29) as f32 / 58.0;
+        let mut image = Array2::from_shape_fn((60, 80), |(y, x)| scene(y, x));
+        image[(10, 20)] = 1e30;
+        image[(40, 30)] = -1e4;
+        image[(40, 31)] = 1e4;
+        image[(50, 50)] = f32::NAN;
+        erase_wild(&mut image);
+        assert_eq!(image.iter().filter(|value| value.is_nan()).count(), 4);
+        let mut spot = Array2::from_elem((100, 100), 1e-4);
+        spot.slice_mut(s![20..23, 30..33]).fill(1.0);
+        erase_wild(&mut spot);
+        assert!(spot.iter().all(|value| value.is_finite()));
     }
 
     #[test]

@@ -10,6 +10,7 @@ mod input;
 mod measure;
 mod optics_files;
 mod planes;
+mod quality;
 mod random_planes;
 mod stack;
 mod stream;

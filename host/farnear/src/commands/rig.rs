@@ -86,7 +86,6 @@ pub enum Job {
 }
 
 // No doc comment: the help text is that of the command.
-#[allow(missing_docs)]
 #[derive(Args)]
 pub struct Question {
     #[command(flatten)]

@@ -2,7 +2,6 @@ use std::{net::SocketAddr, path::PathBuf, time::Duration};
 
 use anyhow::{Result, bail};
 use clap::Args;
-use farnear_protocol::Micros;
 use farnear_serve::{Limits, Listen, ServeSettings, Token, serve};
 use farnear_workflows::{
     operator_cache::data_folder,
@@ -10,6 +9,7 @@ use farnear_workflows::{
     simulator::Scenery,
 };
 
+use super::rig::target::checked;
 use crate::{
     report::{self, Usage},
     scene::{SceneArgument, packed},
@@ -33,7 +33,7 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME=VALUE")]
     set: Vec<farnear_capture::camera::Setting>,
     /// Scene before the emulated camera: plane:MM, staircase, slant, cone, sphere or a scene file [default: staircase].
-    #[arg(long, value_parser = scene)]
+    #[arg(long, value_parser = checked::<SceneArgument>)]
     scene: Option<String>,
     /// Folder of captures, created if missing [default: farnear/session in the user's data folder].
     #[arg(long, value_name = "DIR")]
@@ -76,10 +76,6 @@ pub struct Arguments {
     open: bool,
 }
 
-fn scene(text: &str) -> Result<String, farnear_scene::SceneError> {
-    text.parse::<SceneArgument>().map(|_| text.to_owned())
-}
-
 pub fn run(arguments: Arguments) -> Result<()> {
     let rig = match arguments.rig.as_deref() {
         // Runs in real time, because people watch it.
@@ -111,10 +107,8 @@ pub fn run(arguments: Arguments) -> Result<()> {
         rig,
         camera: CameraSettings {
             address: arguments.camera.parse()?,
-            exposure: Micros(5_000),
-            image_wait: Duration::from_secs(30),
             settings: arguments.set,
-            light: None,
+            ..CameraSettings::default()
         },
         session,
         optics: arguments.optics,

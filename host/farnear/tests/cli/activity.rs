@@ -6,6 +6,7 @@ mod shipped;
 
 use std::{fs, path::Path, sync::LazyLock};
 
+use assert_cmd::Command;
 use image::{GrayImage, Luma};
 use serde_json::Value;
 
@@ -24,17 +25,8 @@ static PEOPLE: LazyLock<People> = LazyLock::new(|| {
     let out = folder.text("people");
     let count = SUBJECTS.to_string();
     let made = figures(
-        farnear(&[
-            "silhouettes",
-            "synthetic",
-            "--subjects",
-            &count,
-            "--activities",
-            "walk,crouch,dig",
-            "--views",
-            "2",
-        ])
-        .args(["--rate-hz", "6", "--mm-per-px", "25", "--out", &out, "--json"]),
+        farnear(&["silhouettes", "synthetic", "--subjects", &count, "--activities", "walk,crouch,dig"])
+            .args(["--views", "2", "--rate-hz", "6", "--mm-per-px", "25", "--out", &out, "--json"]),
     );
     assert_eq!((number(&made, "performances"), number(&made, "views")), (12.0, 2.0));
     let samples = folder.text("people/samples.toml");
@@ -48,6 +40,12 @@ impl People {
 
     fn masks(&self, name: &str, view: u32) -> String {
         self.folder.text(&format!("people/{name}-1/view{view}"))
+    }
+
+    fn train(&self, model: &str, more: &[&str]) -> Command {
+        let mut command = farnear(&["activity", "train", &self.samples, "--out", model]);
+        command.args(more);
+        command
     }
 
     /// Writes the samples that satisfy `keep` into a file of their own.
@@ -132,16 +130,7 @@ fn other_samples_can_be_learned_from_but_never_the_same_people() {
 fn models_answer_live_and_in_windows_and_refuse_what_they_do_not_know() {
     let people = &*PEOPLE;
     let model = people.text("model.fnm");
-    let trained = figures(&mut farnear(&[
-        "activity",
-        "train",
-        &people.samples,
-        "--out",
-        &model,
-        "--any-view",
-        "--no-search",
-        "--json",
-    ]));
+    let trained = figures(&mut people.train(&model, &["--any-view", "--no-search", "--json"]));
     assert_eq!((number(&trained, "clips"), number(&trained, "views")), (24.0, 1.0));
     let masks = people.masks("p01-dig", 1);
     let recognise = ["activity", "recognise", &masks, "--model", &model];
@@ -198,7 +187,7 @@ fn models_answer_live_and_in_windows_and_refuse_what_they_do_not_know() {
     );
 
     let fused = people.text("fused.fnm");
-    succeeds(&mut farnear(&["activity", "train", &people.samples, "--out", &fused, "--no-search"]));
+    succeeds(&mut people.train(&fused, &["--no-search"]));
     let second = people.masks("p01-dig", 2);
     fails(&mut farnear(&["activity", "recognise", &masks, "--model", &fused]), 1, &["fused.fnm", "2 views"]);
     let both =
@@ -210,16 +199,7 @@ fn models_answer_live_and_in_windows_and_refuse_what_they_do_not_know() {
 fn settings_are_chosen_over_the_subjects_where_they_are_not_given() {
     let people = &*PEOPLE;
     let model = people.text("thesis.fnm");
-    let trained = figures(&mut farnear(&[
-        "activity",
-        "train",
-        &people.samples,
-        "--out",
-        &model,
-        "--epl",
-        "thesis",
-        "--json",
-    ]));
+    let trained = figures(&mut people.train(&model, &["--epl", "thesis", "--json"]));
     assert!(number(&trained, "condition_number") > 1.0, "{trained}");
     let gamma = number(&trained, "gamma");
     assert!([0.03, 0.1, 0.3, 1.0].iter().any(|g| (g - gamma).abs() < 1e-6), "{trained}");
@@ -249,19 +229,10 @@ fn damaged_models_and_samples_are_named_and_nothing_is_written() {
     let notes = people.folder.file("notes.txt", "mine");
     for (file, why) in [(&people.samples, "replace the input"), (&notes, "not a model")] {
         let before = fs::read(file).expect("a file");
-        let train = ["activity", "train", &people.samples, "--no-search", "--out", file];
-        fails(&mut farnear(&train), 2, &[file.as_str(), why, "name another file"]);
+        fails(&mut people.train(file, &["--no-search"]), 2, &[file.as_str(), why, "name another file"]);
         assert_eq!(fs::read(file).expect("a file"), before);
     }
-    succeeds(&mut farnear(&[
-        "activity",
-        "train",
-        &people.samples,
-        "--out",
-        &model,
-        "--any-view",
-        "--no-search",
-    ]));
+    succeeds(&mut people.train(&model, &["--any-view", "--no-search"]));
     let bytes = fs::read(&model).expect("a model");
     let changed = |name: &str, at: usize| {
         let mut bytes = bytes.clone();

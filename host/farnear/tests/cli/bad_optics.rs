@@ -56,9 +56,9 @@ fn invalid_optics_files_are_named_in_the_error() {
     let bytes = folder.file("bytes.toml", [0xff, 0xfe, 0, 9]);
     for (file, phrases) in [
         (&empty, ["empty.toml", "lens"]),
-        (&bytes, ["bytes.toml", "UTF-8"]),
+        (&bytes, ["bytes.toml", "UTF-8; expected a TOML file"]),
         (&folder.text("absent.toml"), ["absent.toml", "No such file"]),
-        (&folder.text(""), ["cannot read the optics file", "Is a directory"]),
+        (&folder.text(""), ["cannot read the optics file", "; expected a TOML file"]),
     ] {
         fails(&mut farnear(&["optics", "--optics", file]), 1, &phrases);
     }

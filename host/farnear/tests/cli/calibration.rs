@@ -2,11 +2,12 @@
 
 use std::{fs, path::Path};
 
+use assert_cmd::Command;
 use farnear_files::{image_file, map, npy};
 use ndarray::Array2;
 use tempfile::TempDir;
 
-use crate::common::farnear;
+use crate::common::{fails, farnear, figures, succeeds};
 
 const OPTICS: &str = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n\
                       [focus]\nfar_mm = 933.0\nmax_blur_px = 2.703\n[psf]\nmodel = \"gaussian\"\nk = 0.4578\n";
@@ -21,23 +22,20 @@ impl Bench {
         Self(folder)
     }
 
-    fn output(&self, arguments: &[&str]) -> std::process::Output {
-        farnear(arguments).current_dir(self.0.path()).output().unwrap()
+    fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = farnear(arguments);
+        command.current_dir(self.0.path());
+        command
     }
 
     #[track_caller]
     fn figures(&self, arguments: &[&str]) -> serde_json::Value {
-        let output = self.output(&[arguments, &["--json"]].concat());
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        serde_json::from_slice(&output.stdout).unwrap()
+        figures(self.command(arguments).arg("--json"))
     }
 
     #[track_caller]
     fn fails(&self, code: i32, arguments: &[&str], expected: &str) {
-        let output = self.output(arguments);
-        let text = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(code), "{text}");
-        assert!(text.contains(expected), "`{expected}` is not in: {text}");
+        fails(&mut self.command(arguments), code, &[expected]);
     }
 
     fn render(&self, scene: &str, noise: &str, out: &str) {
@@ -124,14 +122,12 @@ fn a_shifted_pair_is_aligned_or_reported() {
     assert!((found["moved_px"][0].as_f64().unwrap() - 1.0).abs() < 0.05, "{found}");
     let left = bench.figures(&[&find[..], &["--align", "none"]].concat());
     assert_eq!(left["verdict"], "unexplained", "{left}");
-    let output = bench.output(&[&find[..], &["--align", "none", "--out", "found.toml"]].concat());
+    let unaligned = [&find[..], &["--align", "none", "--out", "found.toml"]].concat();
+    let (_, stderr) = succeeds(&mut bench.command(&unaligned));
     let written = fs::read_to_string(bench.0.path().join("found.toml")).unwrap();
     assert!(written.starts_with("# unexplained: the gaussian"), "{written}");
     bench.figures(&["optics", "--optics", "found.toml"]);
-    assert!(
-        String::from_utf8_lossy(&output.stderr)
-            .contains("warning: the gaussian point spread function leaves")
-    );
+    assert!(stderr.contains("warning: the gaussian point spread function leaves"), "{stderr}");
 }
 
 #[test]

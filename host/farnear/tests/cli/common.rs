@@ -15,6 +15,13 @@ pub fn farnear(arguments: &[&str]) -> Command {
     command
 }
 
+/// A command of the emulated rig.
+pub fn on_the_rig(arguments: &[&str]) -> Command {
+    let mut command = farnear(&["rig"]);
+    command.args(arguments).args(["--port", "sim"]);
+    command
+}
+
 /// The optics of the rig in docs/: 933 to 886.81 mm, Gaussian.
 pub fn rig_optics() -> &'static str {
     concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/rig.toml")

@@ -2,13 +2,7 @@
 
 use std::fs;
 
-use crate::common::{Folder, fails, farnear, figures, number, rig_optics, succeeds};
-
-fn on_the_rig(arguments: &[&str]) -> assert_cmd::Command {
-    let mut command = farnear(&["rig"]);
-    command.args(arguments).args(["--port", "sim"]);
-    command
-}
+use crate::common::{Folder, fails, farnear, figures, number, on_the_rig, rig_optics, succeeds};
 
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]

@@ -5,13 +5,7 @@ use std::{fs, path::Path};
 use farnear_files::{image_file::read_grey, map, npy};
 use ndarray::Array2;
 
-use crate::common::{Folder, fails, farnear, figures, number, rig_optics, succeeds};
-
-fn on_the_rig(arguments: &[&str]) -> assert_cmd::Command {
-    let mut command = farnear(&["rig"]);
-    command.args(arguments).args(["--port", "sim"]);
-    command
-}
+use crate::common::{Folder, fails, farnear, figures, number, on_the_rig, rig_optics, succeeds};
 
 /// True sensor position at the end of a trace, in mm from the lens.
 fn true_sensor_mm(trace: &str) -> f64 {

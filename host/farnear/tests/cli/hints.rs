@@ -18,17 +18,6 @@ fn an_unknown_name_of_a_model_is_answered_with_the_names_that_exist() {
 }
 
 #[test]
-fn an_image_or_a_folder_instead_of_optics_is_answered_with_what_is_expected() {
-    let folder = Folder::new();
-    fs::write(folder.path("far.png"), b"\x89PNG\xff").unwrap();
-    fs::create_dir(folder.path("pair")).unwrap();
-    for name in ["far.png", "pair"] {
-        let file = folder.text(name);
-        fails(&mut farnear(&["optics", "--optics", &file]), 1, &[&file, "expected a TOML file"]);
-    }
-}
-
-#[test]
 fn recordings_and_folders_of_views_or_videos_are_answered_with_what_is_read_instead() {
     let folder = Folder::new();
     for name in ["views/view1", "views/view2", "videos", "texts"] {

@@ -26,16 +26,8 @@ fn capture(folder: &Folder, name: &str, light: &Light, arguments: &[&str]) -> St
 /// Computes depth; returns the figures of the map, and its error in mm.
 fn depth(folder: &Folder, name: &str) -> (serde_json::Value, f64) {
     let [far, near] = ["far.png", "near.png"].map(|file| folder.text(&format!("{name}/{file}")));
-    let found = figures(&mut farnear(&[
-        "depth",
-        &far,
-        &near,
-        "--optics",
-        rig_optics(),
-        "--median-px",
-        "5",
-        "--json",
-    ]));
+    let mut command = farnear(&["depth", &far, &near, "--optics", rig_optics()]);
+    let found = figures(command.args(["--median-px", "5", "--json"]));
     let scene = folder.text("scene");
     if !folder.path("scene").exists() {
         succeeds(&mut farnear(&["render", "--optics", rig_optics(), "--out", &scene]));
@@ -64,6 +56,16 @@ fn a_projected_texture_gives_a_blank_wall_its_depth() {
     let [textured, lit, subtracted] = ["textured", "lit", "subtracted"].map(|name| depth(&folder, name).1);
     // The room's light lowers the pattern's contrast. A second exposure doubles the dark pixels' noise.
     assert!(lit < 1.2 * textured && subtracted < 1.3 * textured, "{textured} {lit} {subtracted}");
+}
+
+/// The emulated camera begins 20 us after the trigger.
+#[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
+fn an_exposure_shorter_than_the_cameras_delay_misses_the_light() {
+    let folder = Folder::new();
+    let lamp = Light { room: 0.0, flicker: 0.0, lamp: 100.0, blank_walls: false };
+    let said = capture(&folder, "short", &lamp, &["--light", "0,100", "--exposure-us", "40"]);
+    assert!(said.contains("was dark for") && !said.contains("10 ms"), "{said}");
 }
 
 #[test]

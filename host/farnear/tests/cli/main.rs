@@ -10,7 +10,6 @@ mod bad_optics;
 mod bad_ports;
 mod bad_rigs;
 mod batch;
-mod breakfast;
 mod calibrate_stack;
 mod calibration;
 mod camera;

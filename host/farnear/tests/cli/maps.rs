@@ -60,39 +60,6 @@ fn a_rendered_pair_gives_back_its_depth() {
 }
 
 #[test]
-fn maps_are_replaced_and_other_files_left_alone() {
-    let folder = Folder::new();
-    render(&folder, "slant", "a");
-    render(&folder, "cone", "b");
-    let out = folder.text("out");
-    let depth = |pair: &str| {
-        let [far, near] = ["far.png", "near.png"].map(|name| folder.text(&format!("{pair}/{name}")));
-        succeeds(&mut farnear(&["depth", &far, &near, "--optics", rig_optics(), "--out", &out]));
-        fs::read(folder.path("out/depth.npy")).expect("a map")
-    };
-    let slant = depth("a");
-    fs::write(folder.path("out/notes.txt"), "mine").expect("a writable folder");
-    let cone = depth("b");
-    assert!(slant != cone);
-    assert!(depth("a") == slant, "the same pair gives the same bytes, from the cache of operators too");
-    let names: Vec<_> = folder.listing().into_iter().filter(|name| name.starts_with("out/")).collect();
-    assert_eq!(
-        names,
-        [
-            "out/confidence.npy",
-            "out/depth.npy",
-            "out/depth.png",
-            "out/depth.tiff",
-            "out/depth.toml",
-            "out/mesh.ply",
-            "out/notes.txt",
-            "out/reason.png",
-            "out/view.png"
-        ]
-    );
-}
-
-#[test]
 fn the_kinds_of_images_give_the_same_depth() {
     let folder = Folder::new();
     render(&folder, "cone", "pair");

@@ -374,19 +374,8 @@ fn a_folder_of_openpose_files_gives_masks_of_its_view_and_samples() {
         folder.file(&name, openpose(if frame == 6 { &[] } else { &people }));
     }
     let (poses, out) = (folder.text("poses"), folder.text("masks"));
-    let arguments = [
-        "silhouettes",
-        "markers",
-        &poses,
-        "--mm-per-px",
-        "10",
-        "--samples",
-        "walk",
-        "--subject",
-        "anna",
-        "--out",
-    ];
-    let found = figures(farnear(&arguments).args([&out, "--json"]));
+    let mut command = farnear(&["silhouettes", "markers", &poses, "--mm-per-px", "10", "--out", &out]);
+    let found = figures(command.args(["--samples", "walk", "--subject", "anna", "--json"]));
     assert_eq!(
         (number(&found, "views"), number(&found, "frames"), number(&found, "silhouettes")),
         (1.0, 12.0, 11.0)

@@ -15,14 +15,16 @@ fn capture_fails(port: &str, phrases: &[&str]) {
     assert_eq!(folder.listing(), Vec::<String>::new());
 }
 
+fn rig_at(port: &str, arguments: &[&str]) -> assert_cmd::Command {
+    let mut command = farnear(&["rig"]);
+    command.args(arguments).args(["--port", port]);
+    command
+}
+
 #[test]
 fn a_board_behind_a_port_is_driven_by_one_program_after_the_other() {
     let (port, peer) = plug_in(Faults::default());
-    let rig = |arguments: &[&str]| {
-        let mut command = farnear(&["rig"]);
-        command.args(arguments).args(["--port", &port]);
-        command
-    };
+    let rig = |arguments: &[&str]| rig_at(&port, arguments);
     let info = figures(&mut rig(&["info", "--json"]));
     assert_eq!((&info["board"], &info["emulated"]), (&"scripted".into(), &false.into()));
     succeeds(&mut rig(&["home"]));
@@ -45,11 +47,7 @@ fn a_board_behind_a_port_is_driven_by_one_program_after_the_other() {
 #[test]
 fn an_alarm_is_reported_listed_and_cleared_by_number() {
     let (port, peer) = plug_in(Faults::default());
-    let rig = |arguments: &[&str]| {
-        let mut command = farnear(&["rig"]);
-        command.args(arguments).args(["--port", &port]);
-        command
-    };
+    let rig = |arguments: &[&str]| rig_at(&port, arguments);
     succeeds(&mut rig(&["halt"]));
     fails(
         &mut rig(&["home"]),
@@ -135,11 +133,4 @@ fn another_schema_key_is_reported_with_both_keys() {
     let (port, peer) = plug_in(Faults::default());
     peer.board().hello.schema_key = 0xabc;
     capture_fails(&port, &["message tables differ", "0000000000000abc", "flash the firmware"]);
-}
-
-#[test]
-fn garbage_between_frames_costs_nothing() {
-    let (port, peer) = plug_in(Faults { garbage: vec![7, 0, 255, 255, 0], ..Faults::default() });
-    succeeds(&mut farnear(&["rig", "home", "--port", &port]));
-    assert_eq!(peer.board().acts, 2);
 }

@@ -169,21 +169,9 @@ fn doubtful_frames_are_flagged() {
     let [masks, out, into] = ["masks", "out", "into"].map(|name| folder.text(name));
     // At noon on the northern half the sun is in the south. The camera looks north, so the shadow lies behind the
     // person.
-    let arguments = [
-        "shadow",
-        "remove",
-        &masks,
-        "--camera",
-        &camera,
-        "--lat",
-        "52.38",
-        "--lon",
-        "-1.56",
-        "--rate-hz",
-        "25",
-    ];
-    let found =
-        figures(farnear(&arguments).args(["--time", "2014-06-23T12:00:00Z", "--out", &out, "--json"]));
+    let mut summer = farnear(&["shadow", "remove", &masks, "--camera", &camera, "--rate-hz", "25", "--json"]);
+    summer.args(["--time", "2014-06-23T12:00:00Z", "--lat", "52.38", "--lon", "-1.56", "--out", &out]);
+    let found = figures(&mut summer);
     assert_eq!((number(&found, "cut"), number(&found, "empty"), number(&found, "flagged")), (2.0, 1.0, 3.0));
     let index = std::fs::read_to_string(folder.path("out/shadow.toml")).expect("an index");
     let index: toml::Table = index.parse().expect("TOML");

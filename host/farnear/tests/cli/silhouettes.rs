@@ -74,19 +74,12 @@ fn mask(folder: &Path, name: &str) -> GrayImage {
 }
 
 fn figures(command: &mut Command) -> serde_json::Value {
-    let output = command.arg("--json").output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    serde_json::from_slice(&output.stdout).unwrap()
+    crate::common::figures(command.arg("--json"))
 }
 
 #[track_caller]
 fn fails(command: &mut Command, out: &Path, expected: &[&str]) {
-    let output = command.output().unwrap();
-    let text = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(1), "{text}");
-    for part in expected {
-        assert!(text.contains(part), "`{part}` is not in: {text}");
-    }
+    crate::common::fails(command, 1, expected);
     assert!(!out.exists(), "{} was left behind", out.display());
 }
 
@@ -243,11 +236,8 @@ fn labels_in_the_place_of_the_masks_are_refused_before_the_work() {
     for labels in [out.clone(), out.join("labels"), video.join("../masks")] {
         let mut command = farnear();
         command.args(["silhouettes", "video", "--out"]).arg(&out).arg("--labels").arg(&labels).arg(&video);
-        let output = command.output().unwrap();
-        let text = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{text}");
         let expected = format!("labels {}: expected another place", labels.display());
-        assert!(text.contains(&expected), "{text}");
+        crate::common::fails(&mut command, 2, &[&expected]);
         assert!(!out.exists());
     }
 }

@@ -1,6 +1,6 @@
 //! The numbers in a file's name and the text around them.
 
-use std::path::Path;
+use std::{collections::HashSet, path::Path};
 
 /// `pos_-0.25mm` has the texts `pos_` and `mm` around the number -0.25.
 #[derive(Clone, PartialEq, Debug)]
@@ -96,10 +96,41 @@ fn exponent(text: &str) -> usize {
     digits.filter(|digits| *digits > 0).map_or(0, |digits| 2 + digits)
 }
 
+/// The number that counts names with one pattern of texts: that of the [`focus`], else the last that differs.
+pub(crate) fn counting(names: &[Name]) -> Option<usize> {
+    focus(names).or_else(|| last_varying(names))
+}
+
+/// The number of the focus where names state it and it tells them apart: the last that differs, if a unit of length follows, else
+/// one before `um` or `mm`, else one behind `z`. A time may follow (`z1_t12-05`).
+pub(crate) fn focus(names: &[Name]) -> Option<usize> {
+    let last = last_varying(names)?;
+    let texts = &names[0].texts;
+    let tells_apart = |column: &usize| {
+        let mut seen = HashSet::new();
+        names.iter().all(|name| seen.insert(&name.numbers[*column]))
+    };
+    let unit = |column: &usize| first_word(&texts[column + 1]);
+    let is_length = |column: &usize| matches!(unit(column), "um" | "\u{b5}m" | "\u{3bc}m" | "mm");
+    let is_z = |column: &usize| last_word(&texts[*column]).eq_ignore_ascii_case("z");
+    let columns = || (0..=last).rev().filter(tells_apart);
+    let of_last = columns().find(|column| *column == last && (is_length(column) || unit(column) == "nm"));
+    of_last.or_else(|| columns().find(is_length)).or_else(|| columns().find(is_z))
+}
+
 /// The last number that differs between names with one pattern of texts.
-pub(crate) fn last_varying(names: &[Name]) -> Option<usize> {
+fn last_varying(names: &[Name]) -> Option<usize> {
     let first = names.first()?;
     let one_pattern = names.iter().all(|name| name.texts == first.texts);
     let varies = |column: &usize| names.iter().any(|name| name.numbers[*column] != first.numbers[*column]);
     (0..first.numbers.len()).rev().filter(|_| one_pattern).find(varies)
+}
+
+pub(crate) fn first_word(text: &str) -> &str {
+    text.split(|c: char| !c.is_alphabetic()).find(|word| !word.is_empty()).unwrap_or_default()
+}
+
+/// The word at the end of a text; empty behind another sign.
+pub(crate) fn last_word(text: &str) -> &str {
+    text.rsplit(|c: char| !c.is_alphabetic()).next().unwrap_or_default()
 }

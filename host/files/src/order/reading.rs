@@ -8,33 +8,39 @@ use std::{
 
 use super::{
     file_name,
-    name::{Name, Number, last_varying},
+    name::{Name, Number, counting, focus},
     natural,
 };
 
 /// Largest step of even decimals relative to the least.
 const EVEN: f64 = 1.5;
 
-/// How to compare names of one pattern whose last varying number has decimals, signs or separators of thousands.
+/// How to compare names of one pattern whose counting number has decimals, signs or separators of thousands, or is not the last.
 pub(super) struct Values {
     column: usize,
     signed: bool,
+    /// Whether no other number counts.
+    is_focus: bool,
 }
 
 /// The names, without separators of thousands, and how to compare them where the order is not the natural one.
 pub(super) fn read(paths: &[PathBuf]) -> (Vec<Name>, Option<Values>) {
     let mut names: Vec<Name> = paths.iter().map(|path| Name::of(path)).collect();
-    let Some(column) = last_varying(&names) else { return (names, None) };
+    let Some(column) = counting(&names) else { return (names, None) };
     let numbers = column_of(&names, column);
     let minus = |number: &&Number| number.sign == Some('-');
     // With all names, a minus separates: `a-1`, `a-2`.
     let signed = numbers.iter().any(minus) && !numbers.iter().all(minus);
     let thousands = are_thousands(&numbers);
-    let by_value = signed || thousands || decimals(&numbers);
+    let is_focus = focus(&names) == Some(column);
+    let others = |name: &Name| {
+        (0..name.numbers.len()).any(|at| at != column && name.numbers[at] != names[0].numbers[at])
+    };
+    let by_value = signed || thousands || decimals(&numbers) || is_focus && names.iter().any(others);
     if thousands {
         names.iter_mut().for_each(|name| name.numbers[column].text.retain(|c| c != '.'));
     }
-    (names, by_value.then_some(Values { column, signed }))
+    (names, by_value.then_some(Values { column, signed, is_focus }))
 }
 
 fn column_of(names: &[Name], column: usize) -> Vec<&Number> {
@@ -91,7 +97,7 @@ fn may_be_grid(numbers: &[&Number]) -> bool {
 pub fn ambiguity(sorted: &[PathBuf]) -> Option<String> {
     let (understood, _) = read(sorted);
     let names: Vec<Name> = sorted.iter().map(|path| Name::of(path)).collect();
-    let column = last_varying(&names)?;
+    let column = counting(&names)?;
     let numbers = column_of(&names, column);
     if may_be_thousands(&numbers) {
         let at = numbers.iter().position(|number| number.fraction().is_some())?;
@@ -132,7 +138,7 @@ pub fn same_number(paths: &[PathBuf]) -> Option<[&PathBuf; 2]> {
 
 impl Values {
     pub fn order(&self, a: &Name, b: &Name) -> Ordering {
-        let before = a.numbers.iter().zip(&b.numbers).take(self.column);
+        let before = a.numbers.iter().zip(&b.numbers).take(if self.is_focus { 0 } else { self.column });
         let before = before.map(|(a, b)| natural(&a.text, &b.text)).find(|order| order.is_ne());
         let value = |name: &Name| {
             let Number { sign, text } = &name.numbers[self.column];

@@ -8,7 +8,7 @@ use std::{
 use super::positions::unit_um;
 use crate::order::{
     self, file_name,
-    name::{Name, Number, last_varying},
+    name::{Name, Number, counting, first_word, focus, last_word},
 };
 
 /// Largest share of images outside the pattern of the others, relative to these, that is left out and not refused.
@@ -122,13 +122,9 @@ impl Series {
 /// Positions, um, if a unit (nm, um or mm) follows the number that counts the images: `z-83um.tif`.
 pub fn positions_in_names(images: &[PathBuf]) -> Option<Vec<f64>> {
     let names: Vec<Name> = images.iter().map(|path| Name::of(path)).collect();
-    let after = &names.first()?.texts[last_varying(&names)? + 1];
+    let after = &names.first()?.texts[counting(&names)? + 1];
     let um = unit_um(first_word(after)).filter(|um| [1e-3, 1.0, 1e3].contains(um))?;
     order::numbers(images).into_iter().map(|number| Some(number? * um)).collect()
-}
-
-fn first_word(text: &str) -> &str {
-    text.split(|c: char| !c.is_alphabetic()).find(|word| !word.is_empty()).unwrap_or_default()
 }
 
 /// The image whose name begins all others, without their numbers: `a.png` of `a (2).png`, `a (3).png`.
@@ -207,8 +203,11 @@ impl std::fmt::Display for Field {
     }
 }
 
-/// Numbers that some names share, without those that another one of these determines.
+/// Numbers that some names share, without those that another one of these determines; none where the names state one focus each.
 fn fields(names: &[Name]) -> Vec<Field> {
+    if focus(names).is_some() {
+        return Vec::new();
+    }
     let all: Vec<Field> = (0..names[0].numbers.len()).map(|column| field(names, column)).collect();
     let mut fields: Vec<Field> = Vec::new();
     for field in all.into_iter().filter(|field| (2..names.len()).contains(&field.values.len())) {
@@ -235,12 +234,10 @@ fn field(names: &[Name], column: usize) -> Field {
         })
     });
     let of_names = of_names.collect();
-    let before = &names[0].texts[column];
-    let word = before
-        .rfind(|c: char| !c.is_alphabetic())
-        .map_or(0, |at| at + before[at..].chars().next().map_or(0, char::len_utf8));
-    let label =
-        if word < before.len() { before[word..].to_owned() } else { format!("number {}", column + 1) };
+    let label = match last_word(&names[0].texts[column]) {
+        "" => format!("number {}", column + 1),
+        word => word.to_owned(),
+    };
     Field { label, values, of_names }
 }
 
@@ -311,6 +308,7 @@ mod tests {
             of(&|z| format!("z{}.png", i64::from(z) - 2)),
             of(&|z| format!("z{}.png", 1 + 9 * z)),
             of(&|z| format!("2024-05-01_c1_z{z}.png")),
+            of(&|z| format!("z{z:03}_t1{}-{:02}.png", z / 3, 5 + 20 * (z % 3))),
         ] {
             assert_eq!((found.images.len(), found.remarks), (6, vec![]));
         }
@@ -356,6 +354,7 @@ mod tests {
             (["z-83um.tif", "z0um.tif", "z83um.tif"], [-83.0, 0.0, 83.0]),
             (["1 mm.png", "1.5 mm.png", "2 mm.png"], [1000.0, 1500.0, 2000.0]),
             (["a_250nm_x.png", "a_500nm_x.png", "a_750nm_x.png"], [0.25, 0.5, 0.75]),
+            (["z-5um_t12-05.png", "z0um_t12-50.png", "z5um_t13-20.png"], [-5.0, 0.0, 5.0]),
             (["z1\u{b5}m.png", "z2\u{b5}m.png", "z3\u{b5}m.png"], [1.0, 2.0, 3.0]),
         ] {
             let found = of(&names).unwrap();

@@ -22,10 +22,14 @@ impl Graph {
     /// The graph of a sample matrix (N x d) with the `neighbours` nearest of each, at least 1 and below N.
     pub fn new(samples: ArrayView2<f32>, neighbours: usize) -> Result<Self, EmbeddingError> {
         let n = samples.nrows();
+        if n < 2 {
+            let what = "number of samples (at least 2)";
+            return Err(EmbeddingError::Shape { what, expected: 2, found: n });
+        }
         if neighbours == 0 || neighbours >= n {
             return Err(EmbeddingError::Shape {
                 what: "number of neighbours (at least 1, below the number of samples)",
-                expected: n.saturating_sub(1).min(10),
+                expected: neighbours.clamp(1, n - 1),
                 found: neighbours,
             });
         }

@@ -86,7 +86,6 @@ impl Rbf {
         Self { centres, weights, gamma, ridge, condition, fixed, by_dimension }
     }
 
-    /// Number of dimensions.
     pub fn dimensions(&self) -> usize {
         self.weights.ncols()
     }

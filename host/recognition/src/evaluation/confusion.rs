@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 /// Counts of answers per true class.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Confusion {
-    /// Names of the classes.
     pub classes: Vec<String>,
     /// `counts[truth][answer]`.
     pub counts: Vec<Vec<u32>>,

@@ -27,7 +27,6 @@ pub struct Outcome {
     pub chosen: Vec<Choice>,
 }
 
-/// Choices of one fold.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Choice {
     /// Subjects that were left out.
@@ -38,7 +37,6 @@ pub struct Choice {
     pub space: SpaceSettings,
     /// Sharpness of soft assignments.
     pub sharpness: f32,
-    /// Classifier with its parameter.
     pub classifier: ClassifierKind,
     /// Inner accuracy, 0 to 1.
     pub inner_accuracy: Option<f64>,
@@ -55,7 +53,6 @@ impl Outcome {
 
 /// Why an evaluation failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "the messages name the fields")]
 pub enum EvaluationError {
     #[error("leave-one-subject-out needs at least 3 subjects, the samples have {0}")]
     Subjects(usize),

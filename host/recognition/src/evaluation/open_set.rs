@@ -133,7 +133,7 @@ mod tests {
     use super::*;
     use crate::clip::Track;
     use crate::embedding::descriptor::{ANGLES, CELLS};
-    use crate::space::{PatternKind, SpaceSettings};
+    use crate::space::SpaceSettings;
     use ndarray::Array2;
     use rand::{Rng, SeedableRng};
 
@@ -157,13 +157,7 @@ mod tests {
         }
         // Both in one half.
         clips.extend(["a", "c"].map(|subject| clip(subject, 3)));
-        let space = SpaceSettings {
-            dimensions: 4,
-            pattern: PatternKind::Codebook(8),
-            residuals: 0,
-            ..SpaceSettings::default()
-        };
-        let experiment = Experiment::codebook(space);
+        let experiment = Experiment::codebook(SpaceSettings::small());
         let rows = open_set(&clips, |_| experiment.clone(), Scaling::default(), &Unwatched).expect("rows");
         let counts = |name: &str| {
             let row = rows.iter().find(|row| row.left_out.as_deref() == Some(name)).expect("a row");

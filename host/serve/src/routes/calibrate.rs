@@ -5,24 +5,20 @@ use std::{
     path::{Path as FsPath, PathBuf},
 };
 
-use axum::{
-    Json,
-    extract::State,
-    http::{HeaderMap, StatusCode},
-};
+use axum::{Json, extract::State, http::StatusCode};
 use farnear_depth::{calibrate::Model, corrections::Method, optics::OpticsFile};
 use farnear_workflows::{
     Context, WorkflowError,
     calibrate::{
         correction::{self, CalibrateCorrectionRequest},
-        psf::{self, CalibratePsfRequest},
+        psf::CalibratePsfRequest,
     },
     optics::GivenOptics,
     request::Request,
     rig::{
         RigAddress,
         lens_stack::{self, RigStackRequest},
-        targets::{self, TargetSeriesRequest},
+        targets::TargetSeriesRequest,
     },
     sessions,
     simulator::Scenery,
@@ -30,14 +26,14 @@ use farnear_workflows::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Body, Shared, aside, require_client, require_control};
+use super::{Body, Shared, aside};
 use crate::{
     api::{Api, For},
     app::App,
     failure::Failure,
     job_queue::Task,
     options::Options,
-    routes::rig::{begin, connected, figures},
+    routes::rig::{begin, begin_computing, connected, figures},
     view::{Begun, Nothing},
 };
 
@@ -135,12 +131,7 @@ async fn taught(State(app): Shared) -> Result<Json<Taught>, Failure> {
     .await
 }
 
-async fn find_psf(
-    State(app): Shared,
-    headers: HeaderMap,
-    Body(asked): Body<PsfRequest>,
-) -> Result<Json<Begun>, Failure> {
-    require_client(&app, &headers)?;
+async fn find_psf(State(app): Shared, Body(asked): Body<PsfRequest>) -> Result<Json<Begun>, Failure> {
     let bad = |error: String| Failure::new(StatusCode::BAD_REQUEST, error);
     let model: Model =
         asked.model.parse().map_err(|error| bad(format!("model {:?}: {error}", asked.model)))?;
@@ -161,21 +152,14 @@ async fn find_psf(
     if request.images.is_empty() {
         return Err(bad("no pair was chosen: capture a flat, textured target first".into()));
     }
-    let work = move |_: &App, context: &Context<'_>| figures(psf::fit(&request, context)?);
-    compute(&app, Task { kind: "psf", title: "Find the point spread function".into(), work: Box::new(work) })
-}
-
-fn compute(app: &App, task: Task) -> Result<Json<Begun>, Failure> {
-    let job = app.begin_computing(task).map_err(|title| Failure::busy(&title))?;
-    Ok(Json(Begun { job }))
+    let work = move |_: &App, context: &Context<'_>| request.run(context);
+    begin_computing(&app, Task::new("psf", "Find the point spread function", work))
 }
 
 async fn series(
     State(app): Shared,
-    headers: HeaderMap,
     Body(Options(options)): Body<Options<TargetSeriesRequest>>,
 ) -> Result<Json<Begun>, Failure> {
-    require_control(&app, &headers)?;
     let open = connected(&app)?;
     // The scene of the visible emulated rig is fixed, so each target gets its own rig.
     let (rig, ask) = match &app.address {
@@ -193,16 +177,14 @@ async fn series(
         out: app.session.join(SERIES),
         ..options
     };
-    let work = move |_: &App, context: &Context<'_>| figures(targets::capture(&settings, context)?);
-    begin(&app, Task { kind: "flat-series", title: "Capture flat targets".into(), work: Box::new(work) })
+    let work = move |_: &App, context: &Context<'_>| settings.run(context);
+    begin(&app, Task::new("flat-series", "Capture flat targets", work))
 }
 
 async fn lens_of_stack(
     State(app): Shared,
-    headers: HeaderMap,
     Body(Options(options)): Body<Options<RigStackRequest>>,
 ) -> Result<Json<Begun>, Failure> {
-    require_control(&app, &headers)?;
     let open = connected(&app)?;
     let rig = match &app.address {
         // Another emulated rig sees a flat target; its stages are not visible.
@@ -225,15 +207,10 @@ async fn lens_of_stack(
         figures["optics"] = self::figures(OpticsFile::from(lens))?;
         Ok(figures)
     };
-    begin(&app, Task { kind: "lens-stack", title: "Calibrate the lens".into(), work: Box::new(work) })
+    begin(&app, Task::new("lens-stack", "Calibrate the lens", work))
 }
 
-async fn forget(
-    State(app): Shared,
-    headers: HeaderMap,
-    Body(Nothing {}): Body<Nothing>,
-) -> Result<Json<Begun>, Failure> {
-    require_control(&app, &headers)?;
+async fn forget(State(app): Shared, Body(Nothing {}): Body<Nothing>) -> Result<Json<Begun>, Failure> {
     let work = move |app: &App, _: &Context<'_>| {
         let (series, file) = (app.session.join(SERIES), app.session.join(CORRECTION));
         for (path, gone) in [(&series, fs::remove_dir_all(&series)), (&file, fs::remove_file(&file))] {
@@ -244,22 +221,20 @@ async fn forget(
                 _ => {}
             }
         }
-        Ok(serde_json::Value::Null)
+        Ok(())
     };
-    compute(&app, Task { kind: "forget", title: "Forget the flat series".into(), work: Box::new(work) })
+    begin_computing(&app, Task::new("forget", "Forget the flat series", work))
 }
 
 async fn learn(
     State(app): Shared,
-    headers: HeaderMap,
     Body(Options(options)): Body<Options<CalibrateCorrectionRequest>>,
 ) -> Result<Json<Begun>, Failure> {
-    require_client(&app, &headers)?;
     let settings = CalibrateCorrectionRequest {
         patterns: app.session.join(SERIES).join(LIST),
         out: app.session.join(CORRECTION),
         ..options
     };
-    let work = move |_: &App, context: &Context<'_>| figures(correction::learn(&settings, context)?);
-    compute(&app, Task { kind: "correction", title: "Learn the correction".into(), work: Box::new(work) })
+    let work = move |_: &App, context: &Context<'_>| settings.run(context);
+    begin_computing(&app, Task::new("correction", "Learn the correction", work))
 }

@@ -1,22 +1,18 @@
 use std::str::FromStr;
 
-use axum::{
-    Json,
-    extract::State,
-    http::{HeaderMap, StatusCode},
-};
+use axum::{Json, extract::State, http::StatusCode};
 use farnear_capture::camera::Setting;
 use farnear_workflows::{Context, camera, rig::RigAddress};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{Body, Shared, require_control};
+use super::{Body, Shared};
 use crate::{
     api::{Api, For},
     app::App,
     failure::Failure,
     job_queue::Task,
-    routes::rig::{begin, connected, figures},
+    routes::rig::{begin, connected},
     view::Begun,
 };
 
@@ -38,12 +34,7 @@ pub fn routes(api: Api) -> Api {
     )
 }
 
-async fn set(
-    State(app): Shared,
-    headers: HeaderMap,
-    Body(request): Body<CameraRequest>,
-) -> Result<Json<Begun>, Failure> {
-    require_control(&app, &headers)?;
+async fn set(State(app): Shared, Body(request): Body<CameraRequest>) -> Result<Json<Begun>, Failure> {
     let wrong = |reason: String| Failure::new(StatusCode::BAD_REQUEST, reason);
     let wished: Vec<Setting> =
         request.set.iter().map(|text| Setting::from_str(text)).collect::<Result<_, _>>().map_err(wrong)?;
@@ -61,7 +52,7 @@ async fn set(
         };
         // A refused setting is not tried again at the next picture.
         app.set_camera(camera.settings);
-        figures(found)
+        Ok(found)
     };
-    begin(&app, Task { kind: "camera", title: "Set up the camera".into(), work: Box::new(work) })
+    begin(&app, Task::new("camera", "Set up the camera", work))
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use axum::{
     Json,
     extract::{Path, Query, State},
-    http::{HeaderMap, StatusCode},
+    http::{Method, StatusCode},
 };
 use farnear_workflows::{
     Context,
@@ -13,7 +13,7 @@ use farnear_workflows::{
     rig::{
         AxisName, RigAddress,
         pair::{self, CaptureRequest as PairRequest},
-        sequence::{self, SequenceRequest},
+        sequence::SequenceRequest,
         series::{self, SeriesSettings},
     },
     sessions::{self, Note},
@@ -22,7 +22,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
 use serde_json::{Number, Value};
 
-use super::{Body, Shared, aside, require_client, require_control};
+use super::{Body, Shared, aside};
 use crate::{
     api::{Api, For},
     app::App,
@@ -144,8 +144,9 @@ pub fn routes(api: Api) -> Api {
             capture,
         )
         .get::<OneCapture, _, _>("/api/captures/{capture}", "One capture.", one)
-        .delete::<Nothing, Done, _, _>(
+        .change::<Nothing, Done, _, _>(
             "/api/captures/{capture}",
+            Method::DELETE,
             For::Control,
             "Deletes a capture with all of its files.",
             delete,
@@ -156,8 +157,9 @@ pub fn routes(api: Api) -> Api {
             "Renames a capture.",
             rename,
         )
-        .put::<NoteBody, Done, _, _>(
+        .change::<NoteBody, Done, _, _>(
             "/api/captures/{capture}/note",
+            Method::PUT,
             For::Client,
             "Rating and note of a capture.",
             note,
@@ -185,10 +187,8 @@ async fn one(State(app): Shared, Path(name): Path<String>) -> Result<Json<OneCap
 async fn delete(
     State(app): Shared,
     Path(name): Path<String>,
-    headers: HeaderMap,
     Body(Nothing {}): Body<Nothing>,
 ) -> Result<Json<Done>, Failure> {
-    require_control(&app, &headers)?;
     idle(&app)?;
     sessions::delete(&app.session, &name)?;
     app.note(format!("deleted {name}"));
@@ -199,10 +199,8 @@ async fn delete(
 async fn rename(
     State(app): Shared,
     Path(name): Path<String>,
-    headers: HeaderMap,
     Body(RenameRequest { name: to }): Body<RenameRequest>,
 ) -> Result<Json<Done>, Failure> {
-    require_control(&app, &headers)?;
     idle(&app)?;
     sessions::rename(&app.session, &name, &to)?;
     app.change(|state| state.captures += 1);
@@ -220,10 +218,8 @@ fn idle(app: &App) -> Result<(), Failure> {
 async fn note(
     State(app): Shared,
     Path(name): Path<String>,
-    headers: HeaderMap,
     Body(NoteBody { rating, text }): Body<NoteBody>,
 ) -> Result<Json<Done>, Failure> {
-    require_client(&app, &headers)?;
     let folder = sessions::existing(&app.session, &name)?;
     sessions::write_note(&folder, &Note { rating, text })?;
     app.change(|state| state.captures += 1);
@@ -232,13 +228,18 @@ async fn note(
 
 async fn capture(
     State(app): Shared,
-    headers: HeaderMap,
     Body(request): Body<CaptureRequest>,
 ) -> Result<Json<Capturing>, Failure> {
-    require_control(&app, &headers)?;
     let rig = RigAddress::Open(connected(&app)?);
     let (camera, optics) = (app.camera(), app.optics_file());
     let free = |kind, count| sessions::free_names(&app.session, kind, count);
+    let images = |axis, from, to, steps| SequenceRequest {
+        axis: Some(axis),
+        from: Some(from),
+        to: Some(to),
+        steps: Some(steps),
+        ..SequenceRequest::default()
+    };
     let (task, out) = match request {
         CaptureRequest::Pair { name, averaged, subtract_ambient } => {
             let out = match name {
@@ -260,9 +261,9 @@ async fn capture(
                 let captured = pair::capture_seen(&settings, context, |pair| {
                     show_fresh(app, &capture, &pair.far.image, &pair.near.image);
                 });
-                kept(app, figures(captured?))
+                kept(app, captured)
             };
-            (Task { kind: "pair", title: "Capture a pair".into(), work: Box::new(work) }, vec![out])
+            (Task::new("pair", "Capture a pair", work), vec![out])
         }
         CaptureRequest::Series { pairs, interval_s } => {
             if !(0.0..=86_400.0).contains(&interval_s) {
@@ -278,11 +279,8 @@ async fn capture(
             let out = free("series", pairs)?;
             let interval = Duration::from_secs_f64(interval_s);
             let settings = SeriesSettings { rig, camera, optics, interval, out: out.clone() };
-            let work = move |app: &App, context: &Context<'_>| {
-                let captured = series::capture(&settings, context);
-                kept(app, figures(captured?)) // those that are complete stay, also of a series that was stopped
-            };
-            (Task { kind: "series", title: format!("Capture {pairs} pairs"), work: Box::new(work) }, out)
+            let work = move |app: &App, context: &Context<'_>| kept(app, series::capture(&settings, context));
+            (Task::new("series", format!("Capture {pairs} pairs"), work), out)
         }
         CaptureRequest::Still {} => {
             let info = app.state().rig.info;
@@ -293,43 +291,18 @@ async fn capture(
             };
             let at_um = fine_um.clamp(limit("fine_min_um", fine_um), limit("fine_max_um", fine_um));
             let out = free("still", 1)?.remove(0);
-            let settings = SequenceRequest {
-                rig,
-                camera,
-                axis: Some(AxisName::Fine),
-                from: Some(at_um),
-                to: Some(at_um),
-                steps: Some(1),
-                optics: Some(optics),
-                out: out.clone(),
-                ..SequenceRequest::default()
-            };
-            let work = move |app: &App, context: &Context<'_>| {
-                kept(app, figures(sequence::run(&settings, context)?))
-            };
-            (Task { kind: "still", title: "Capture a still".into(), work: Box::new(work) }, vec![out])
+            let still = images(AxisName::Fine, at_um, at_um, 1);
+            let settings = SequenceRequest { rig, camera, optics: Some(optics), out: out.clone(), ..still };
+            let work = move |app: &App, context: &Context<'_>| kept(app, settings.run(context));
+            (Task::new("still", "Capture a still", work), vec![out])
         }
         CaptureRequest::Stack { axis, from_um, to_um, steps } => {
             let out = free("stack", 1)?.remove(0);
-            let settings = SequenceRequest {
-                rig,
-                camera,
-                axis: Some(axis),
-                from: Some(from_um),
-                to: Some(to_um),
-                steps: Some(steps),
-                optics: Some(optics),
-                out: out.clone(),
-                ..SequenceRequest::default()
-            };
+            let stack = images(axis, from_um, to_um, steps);
+            let settings = SequenceRequest { rig, camera, optics: Some(optics), out: out.clone(), ..stack };
             settings.check()?;
-            let work = move |app: &App, context: &Context<'_>| {
-                kept(app, figures(sequence::run(&settings, context)?))
-            };
-            (
-                Task { kind: "stack", title: format!("Capture {steps} images"), work: Box::new(work) },
-                vec![out],
-            )
+            let work = move |app: &App, context: &Context<'_>| kept(app, settings.run(context));
+            (Task::new("stack", format!("Capture {steps} images"), work), vec![out])
         }
     };
     let names = out.iter().map(|folder| name_of(folder)).collect();
@@ -341,7 +314,8 @@ fn name_of(folder: &std::path::Path) -> String {
     folder.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-fn kept(app: &App, figures: farnear_workflows::Result<Value>) -> farnear_workflows::Result<Value> {
+/// Lists the captures again: those that are complete stay, also of a series that was stopped.
+fn kept<T>(app: &App, found: farnear_workflows::Result<T>) -> farnear_workflows::Result<T> {
     app.change(|state| state.captures += 1);
-    figures
+    found
 }

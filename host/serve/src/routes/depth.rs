@@ -3,7 +3,7 @@
 use axum::{
     Json,
     extract::{Path, State},
-    http::{HeaderMap, StatusCode},
+    http::StatusCode,
     response::{IntoResponse, Response},
 };
 use farnear_files::npy;
@@ -19,14 +19,14 @@ use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
-use super::{Body, Shared, aside, calibrate, require_control};
+use super::{Body, Shared, aside, calibrate};
 use crate::{
     api::{Api, For},
     app::App,
     failure::Failure,
     job_queue::Task,
     options::Options,
-    routes::rig::figures,
+    routes::rig::{begin_computing, figures},
     view::Begun,
 };
 
@@ -140,10 +140,8 @@ pub fn routes(api: Api) -> Api {
 async fn compute(
     State(app): Shared,
     Path(name): Path<String>,
-    headers: HeaderMap,
     Body(asked): Body<CaptureDepthRequest>,
 ) -> Result<Json<Begun>, Failure> {
-    require_control(&app, &headers)?;
     let folder = sessions::existing(&app.session, &name)?;
     let CaptureDepthRequest { corrected, variant, mut options } = asked;
     let operators = options.remove("operators").filter(|value| !value.is_null());
@@ -183,20 +181,16 @@ fn begin(app: &App, name: &str, request: impl Request) -> Result<Json<Begun>, Fa
     let work = move |app: &App, context: &Context<'_>| {
         let computed = request.run(context)?;
         app.change(|state| state.captures += 1);
-        figures(computed)
+        Ok(computed)
     };
-    let task = Task { kind: "depth", title: format!("Depth of {name}"), work: Box::new(work) };
-    let job = app.begin_computing(task).map_err(|title| Failure::busy(&title))?;
-    Ok(Json(Begun { job }))
+    begin_computing(app, Task::new("depth", format!("Depth of {name}"), work))
 }
 
 async fn compute_stack(
     State(app): Shared,
     Path(name): Path<String>,
-    headers: HeaderMap,
     Body(Options(options)): Body<Options<FocusStackRequest>>,
 ) -> Result<Json<Begun>, Failure> {
-    require_control(&app, &headers)?;
     let folder = sessions::existing(&app.session, &name)?;
     let out = sessions::variant_of(&folder, sessions::STACK_VARIANT)?;
     let request = FocusStackRequest { stack: folder, out, ..options };

@@ -9,7 +9,7 @@ use axum::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Body, Shared, aside, delayed, require_control, secret, too_many};
+use super::{Body, Shared, aside, delayed, secret, too_many, unknown_client};
 use crate::{
     api::{Api, For},
     app::lock,
@@ -110,12 +110,7 @@ async fn cancel(State(app): Shared, Body(Nothing {}): Body<Nothing>) -> Json<Don
     Json(DONE)
 }
 
-async fn answer(
-    State(app): Shared,
-    headers: HeaderMap,
-    Body(given): Body<Answer>,
-) -> Result<Json<Done>, Failure> {
-    require_control(&app, &headers)?;
+async fn answer(State(app): Shared, Body(given): Body<Answer>) -> Result<Json<Done>, Failure> {
     if app.state().question.is_none() {
         return Err(Failure::new(StatusCode::CONFLICT, "nothing was asked"));
     }
@@ -131,10 +126,7 @@ async fn ask(
     if app.with_control(|control| control.request(secret(&headers))) {
         return Ok(Json(DONE));
     }
-    Err(Failure::new(
-        StatusCode::FORBIDDEN,
-        "unknown client: send the secret of a connected socket in x-farnear-client",
-    ))
+    Err(unknown_client())
 }
 
 async fn hand_over(

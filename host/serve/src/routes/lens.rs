@@ -1,6 +1,6 @@
 //! The optics and quantities derived from them.
 
-use axum::{Json, extract::State, http::HeaderMap};
+use axum::{Json, extract::State, http::Method};
 use farnear_depth::optics::{LightSection, OpticsFile};
 use farnear_files::staging::write_file;
 use farnear_workflows::{
@@ -12,7 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::{Body, Shared, require_control};
+use super::{Body, Shared};
 use crate::{
     api::{Api, For},
     failure::Failure,
@@ -51,8 +51,9 @@ pub struct Calculated {
 
 pub fn routes(api: Api) -> Api {
     api.get::<Optics, _, _>("/api/optics", "The optics that captures are taken with.", read)
-        .put::<Optics, Done, _, _>(
+        .change::<Optics, Done, _, _>(
             "/api/optics",
+            Method::PUT,
             For::Control,
             "Takes captures with other optics from now on.",
             write,
@@ -76,12 +77,7 @@ fn light_of(given: &GivenOptics) -> Option<LightSection> {
     given.table.get("light").and_then(|light| light.clone().try_into().ok())
 }
 
-async fn write(
-    State(app): Shared,
-    headers: HeaderMap,
-    Body(given): Body<Optics>,
-) -> Result<Json<Done>, Failure> {
-    require_control(&app, &headers)?;
+async fn write(State(app): Shared, Body(given): Body<Optics>) -> Result<Json<Done>, Failure> {
     let file = app.optics_file();
     // Invalid values are refused before the file changes.
     let checked = lens_table::calculate(&given.optics, Readings::default())?.optics;

@@ -6,7 +6,7 @@ use axum::{
     Json,
     body::Body as AxumBody,
     extract::{Path, State},
-    http::{HeaderMap, StatusCode, header},
+    http::{StatusCode, header},
     response::{IntoResponse, Response},
 };
 use farnear_shadow::{CameraFile, camera};
@@ -23,7 +23,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::{Body, Shared, aside, require_client, require_control};
+use super::{Body, Shared, aside};
 use crate::{
     api::{Api, For},
     app::App,
@@ -31,7 +31,7 @@ use crate::{
     job_queue::Task,
     options::Options,
     picture_message::person,
-    routes::rig::{begin, connected, figures},
+    routes::rig::{begin, begin_computing, connected, figures},
     transfer::{self, file_body, is_regular, regular_file, session_folder},
     upload_quota::Upload,
     view::{Begun, DONE, Done},
@@ -160,10 +160,8 @@ async fn people(State(app): Shared) -> Result<Json<People>, Failure> {
 async fn receive(
     State(app): Shared,
     Path(name): Path<String>,
-    headers: HeaderMap,
     body: AxumBody,
 ) -> Result<Json<Done>, Failure> {
-    require_control(&app, &headers)?;
     let within = folder(&app)?;
     let path = sessions::entry_of(&within, &name, "video")?;
     let (limits, quota) = (app.limits, Arc::clone(&app.uploads));
@@ -179,11 +177,8 @@ async fn receive(
 
 async fn recognise(
     State(app): Shared,
-    headers: HeaderMap,
     Body(RecogniseRequest { video }): Body<RecogniseRequest>,
 ) -> Result<Json<Begun>, Failure> {
-    require_control(&app, &headers)?;
-    let title = |what: &str| format!("Recognise {what}");
     let Some(name) = video else {
         let settings = LiveSettings { rig: RigAddress::Open(connected(&app)?), camera: app.camera() };
         let work = move |app: &App, context: &Context<'_>| {
@@ -192,22 +187,19 @@ async fn recognise(
                 app.pictures.send_replace(person(moment));
                 Ok(())
             })?;
-            Ok(Value::Null)
+            Ok(())
         };
-        let task = Task { kind: "recognise", title: title("what the camera sees"), work: Box::new(work) };
-        return begin(&app, task);
+        return begin(&app, Task::new("recognise", "Recognise what the camera sees", work));
     };
     let path = video_of(&app, &name)?;
     let work = move |app: &App, context: &Context<'_>| {
         let model = Model::read(USUAL_MODEL.as_ref())?;
-        figures(streaming::video(&path, &model, context, |moment| {
+        streaming::video(&path, &model, context, |moment| {
             app.pictures.send_replace(person(moment));
             Ok(())
-        })?)
+        })
     };
-    let task = Task { kind: "recognise", title: title(&name), work: Box::new(work) };
-    let job = app.begin_computing(task).map_err(|title| Failure::busy(&title))?;
-    Ok(Json(Begun { job }))
+    begin_computing(&app, Task::new("recognise", format!("Recognise {name}"), work))
 }
 
 async fn sunlight(Body(Options(sun)): Body<Options<SunPositionRequest>>) -> Result<Json<Shadow>, Failure> {
@@ -220,12 +212,7 @@ async fn sunlight(Body(Options(sun)): Body<Options<SunPositionRequest>>) -> Resu
     }))
 }
 
-async fn shadow(
-    State(app): Shared,
-    headers: HeaderMap,
-    Body(request): Body<ShadowRequest>,
-) -> Result<Json<Removing>, Failure> {
-    require_client(&app, &headers)?;
+async fn shadow(State(app): Shared, Body(request): Body<ShadowRequest>) -> Result<Json<Removing>, Failure> {
     let video = video_of(&app, &request.video)?;
     request.sun.moment()?;
     let out = sessions::free_names(&folder(&app)?, "shadow", 1)?.remove(0);
@@ -259,9 +246,8 @@ async fn shadow(
         found["shadow"] = masks.into();
         Ok(found)
     };
-    let title = format!("Shadow of {}", request.video);
-    let task = Task { kind: "shadow", title, work: Box::new(work) };
-    let job = app.begin_computing(task).map_err(|title| Failure::busy(&title))?;
+    let task = Task::new("shadow", format!("Shadow of {}", request.video), work);
+    let Json(Begun { job }) = begin_computing(&app, task)?;
     Ok(Json(Removing { job, shadow: name }))
 }
 

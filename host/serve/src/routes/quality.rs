@@ -1,4 +1,4 @@
-use axum::{Json, extract::State, http::HeaderMap};
+use axum::{Json, extract::State};
 use farnear_workflows::{
     Context,
     request::Request,
@@ -11,7 +11,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::{Body, Shared, aside, require_control};
+use super::{Body, Shared, aside};
 use crate::{
     api::{Api, For},
     app::App,
@@ -52,10 +52,8 @@ async fn list(State(app): Shared) -> Result<Json<Records>, Failure> {
 
 async fn measure(
     State(app): Shared,
-    headers: HeaderMap,
     Body(Options(options)): Body<Options<QualityRequest>>,
 ) -> Result<Json<Begun>, Failure> {
-    require_control(&app, &headers)?;
     let request = QualityRequest {
         rig: RigAddress::Open(connected(&app)?),
         camera: app.camera(),
@@ -65,6 +63,6 @@ async fn measure(
     };
     request.check()?;
     let title = format!("Depth quality over {} pairs", request.pairs);
-    let work = move |_: &App, context: &Context<'_>| figures(request.run(context)?);
-    begin(&app, Task { kind: "quality", title, work: Box::new(work) })
+    let work = move |_: &App, context: &Context<'_>| request.run(context);
+    begin(&app, Task::new("quality", title, work))
 }

@@ -1,22 +1,18 @@
 use std::{fs, path::PathBuf};
 
-use axum::{
-    Json,
-    extract::State,
-    http::{HeaderMap, StatusCode},
-};
-use farnear_workflows::{Context, WorkflowError, optics::GivenOptics, rig::recording::Recorder, sessions};
+use axum::{Json, extract::State, http::StatusCode};
+use farnear_workflows::{Context, optics::GivenOptics, rig::recording::Recorder, sessions};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Body, Shared, aside, require_client, require_control};
+use super::{Body, Shared, aside};
 use crate::{
     api::{Api, For},
     app::{App, lock},
     failure::Failure,
     job_queue::Task,
     live,
-    routes::rig::figures,
+    routes::rig::begin_computing,
     transfer::{is_regular, session_folder},
     view::{Begun, DONE, Done, LiveMode},
 };
@@ -99,10 +95,8 @@ async fn list(State(app): Shared) -> Result<Json<Recordings>, Failure> {
 
 async fn record(
     State(app): Shared,
-    headers: HeaderMap,
     Body(RecordRequest { on }): Body<RecordRequest>,
 ) -> Result<Json<Done>, Failure> {
-    require_control(&app, &headers)?;
     // Both wait for the disk, also for the pair that is being written.
     aside(move || match on {
         true => begin_recording(&app),
@@ -136,20 +130,14 @@ fn begin_recording(app: &App) -> Result<(), Failure> {
 
 async fn play(
     State(app): Shared,
-    headers: HeaderMap,
     Body(PlayRequest { recording, fast }): Body<PlayRequest>,
 ) -> Result<Json<Begun>, Failure> {
-    require_client(&app, &headers)?;
     let path = sessions::entry_of(&folder(&app)?, &recording, "recording")?;
     if !is_regular(&path) {
         return Err(Failure::missing(&format!("recording {recording}")));
     }
-    let work = move |app: &App, context: &Context<'_>| -> Result<_, WorkflowError> {
-        figures(live::play(app, &path, fast, context)?)
-    };
-    let task = Task { kind: "play", title: format!("Play {recording}"), work: Box::new(work) };
-    let job = app.begin_computing(task).map_err(|title| Failure::busy(&title))?;
-    Ok(Json(Begun { job }))
+    let work = move |app: &App, context: &Context<'_>| live::play(app, &path, fast, context);
+    begin_computing(&app, Task::new("play", format!("Play {recording}"), work))
 }
 
 #[cfg(test)]
@@ -163,7 +151,7 @@ mod tests {
     };
 
     use super::*;
-    use crate::{api::CLIENT_HEADER, live::tests::app};
+    use crate::live::tests::app;
 
     #[test]
     fn no_recording_begins_while_live_depth_ends() {
@@ -189,12 +177,9 @@ mod tests {
         app.set_live(|live| live.mode = LiveMode::Depth);
         begin_recording(&app).unwrap();
         assert_eq!(app.state().live.recording.as_deref(), Some("live-001.pairs"));
-        let client = app.with_control(|control| control.join(None)).unwrap();
-        let mut headers = HeaderMap::new();
-        headers.insert(CLIENT_HEADER, client.secret.parse().unwrap());
         let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
         let writing = lock(&app.recorder);
-        let request = record(State(Arc::clone(&app)), headers, Body(RecordRequest { on: false }));
+        let request = record(State(Arc::clone(&app)), Body(RecordRequest { on: false }));
         let mut request = Box::pin(request);
         let waits = poll_fn(|context| Poll::Ready(request.as_mut().poll(context).is_pending()));
         assert!(runtime.block_on(waits), "it waits in another thread");

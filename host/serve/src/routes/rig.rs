@@ -1,10 +1,6 @@
 //! Motion of the rig, and its live view.
 
-use axum::{
-    Json,
-    extract::State,
-    http::{HeaderMap, StatusCode},
-};
+use axum::{Json, extract::State, http::StatusCode};
 use farnear_protocol::{Micros, message::Axis};
 use farnear_workflows::{
     Context, WorkflowError,
@@ -14,7 +10,7 @@ use farnear_workflows::{
     rig::{
         RigAddress, alarms, board,
         camera::light_of_percent,
-        check::{self, CheckRequest},
+        check::CheckRequest,
         focus::FocusRequest,
         goto::{self, GotoSettings},
         motion::{HomeRequest, MoveRequest},
@@ -25,7 +21,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::{Body, Shared, aside, require_control};
+use super::{Body, Shared, aside};
 use crate::{
     api::{Api, For},
     app::App,
@@ -153,17 +149,17 @@ pub fn begin(app: &App, task: Task) -> Result<Json<Begun>, Failure> {
     Ok(Json(Begun { job }))
 }
 
+pub fn begin_computing(app: &App, task: Task) -> Result<Json<Begun>, Failure> {
+    let job = app.begin_computing(task).map_err(|title| Failure::busy(&title))?;
+    Ok(Json(Begun { job }))
+}
+
 pub fn figures(figures: impl Serialize) -> farnear_workflows::Result<Value> {
     let nowhere = std::path::Path::new("the figures");
     serde_json::to_value(figures).map_err(WorkflowError::file(nowhere, "plain values"))
 }
 
-async fn connect(
-    State(app): Shared,
-    headers: HeaderMap,
-    Body(Nothing {}): Body<Nothing>,
-) -> Result<Json<Done>, Failure> {
-    require_control(&app, &headers)?;
+async fn connect(State(app): Shared, Body(Nothing {}): Body<Nothing>) -> Result<Json<Done>, Failure> {
     if app.address.is_none() {
         connected(&app)?;
     }
@@ -180,12 +176,7 @@ fn connect_again(app: &App, prepare: impl FnOnce()) -> Result<Json<Done>, Failur
     Ok(Json(DONE))
 }
 
-async fn set_scene(
-    State(app): Shared,
-    headers: HeaderMap,
-    Body(Scene { scene }): Body<Scene>,
-) -> Result<Json<Done>, Failure> {
-    require_control(&app, &headers)?;
+async fn set_scene(State(app): Shared, Body(Scene { scene }): Body<Scene>) -> Result<Json<Done>, Failure> {
     let given =
         app.address.as_ref().filter(|address| address.is_emulated()).ok_or_else(|| {
             Failure::new(StatusCode::BAD_REQUEST, "only an emulated rig can change its scene")
@@ -212,44 +203,33 @@ fn known(scene: String, app: &App) -> Result<String, Failure> {
 
 async fn home(
     State(app): Shared,
-    headers: HeaderMap,
     Body(Options(mut request)): Body<Options<HomeRequest>>,
 ) -> Result<Json<Begun>, Failure> {
-    require_control(&app, &headers)?;
     request.set_rig(RigAddress::Open(connected(&app)?));
-    let work = move |_: &App, context: &Context<'_>| figures(request.run(context)?);
-    begin(&app, Task { kind: "home", title: "Home".into(), work: Box::new(work) })
+    begin(&app, Task::new("home", "Home", move |_, context| request.run(context)))
 }
 
 async fn move_to(
     State(app): Shared,
-    headers: HeaderMap,
     Body(Options(mut request)): Body<Options<MoveRequest>>,
 ) -> Result<Json<Begun>, Failure> {
-    require_control(&app, &headers)?;
     request.set_rig(RigAddress::Open(connected(&app)?));
     request.check()?;
     let targets = request.axis.iter().zip(&request.to_um);
     let words: Vec<_> =
         targets.map(|(axis, to_um)| format!("{} to {to_um:.3} um", Axis::from(*axis).name())).collect();
-    let work = move |_: &App, context: &Context<'_>| figures(request.run(context)?);
-    begin(&app, Task { kind: "move", title: format!("Move {}", words.join(", ")), work: Box::new(work) })
+    let title = format!("Move {}", words.join(", "));
+    begin(&app, Task::new("move", title, move |_, context| request.run(context)))
 }
 
-async fn go(
-    State(app): Shared,
-    headers: HeaderMap,
-    Body(request): Body<Goto>,
-) -> Result<Json<Begun>, Failure> {
-    require_control(&app, &headers)?;
+async fn go(State(app): Shared, Body(request): Body<Goto>) -> Result<Json<Begun>, Failure> {
     let rig = RigAddress::Open(connected(&app)?);
     let (focus, title) = match request.focus {
         FocusName::Far => (goto::Focus::Far, "Go to the far focus"),
         FocusName::Near => (goto::Focus::Near, "Go to the near focus"),
     };
     let settings = GotoSettings { rig, optics: app.optics_file(), focus };
-    let work = move |_: &App, context: &Context<'_>| figures(goto::goto(&settings, context)?);
-    begin(&app, Task { kind: "goto", title: title.into(), work: Box::new(work) })
+    begin(&app, Task::new("goto", title, move |_, context| goto::goto(&settings, context)))
 }
 
 fn measure(name: &str) -> Result<farnear_depth::focus_measure::FocusMeasure, Failure> {
@@ -260,47 +240,27 @@ fn measure(name: &str) -> Result<farnear_depth::focus_measure::FocusMeasure, Fai
 
 async fn seek(
     State(app): Shared,
-    headers: HeaderMap,
     Body(Options(options)): Body<Options<FocusRequest>>,
 ) -> Result<Json<Begun>, Failure> {
-    require_control(&app, &headers)?;
     let rig = RigAddress::Open(connected(&app)?);
     let request = FocusRequest { rig, camera: app.camera(), optics: app.optics_file(), ..options };
     request.check()?;
-    let work = move |_: &App, context: &Context<'_>| figures(request.run(context)?);
-    begin(&app, Task { kind: "focus", title: "Find the focus".into(), work: Box::new(work) })
+    begin(&app, Task::new("focus", "Find the focus", move |_, context| request.run(context)))
 }
 
-async fn checklist(
-    State(app): Shared,
-    headers: HeaderMap,
-    Body(Nothing {}): Body<Nothing>,
-) -> Result<Json<Begun>, Failure> {
-    require_control(&app, &headers)?;
+async fn checklist(State(app): Shared, Body(Nothing {}): Body<Nothing>) -> Result<Json<Begun>, Failure> {
     let rig = connected(&app)?;
     let settings =
         CheckRequest { rig: RigAddress::Open(rig), camera: app.camera(), ..CheckRequest::default() };
-    let work = move |_: &App, context: &Context<'_>| figures(check::check(&settings, context)?);
-    begin(&app, Task { kind: "check", title: "Bring-up checklist".into(), work: Box::new(work) })
+    begin(&app, Task::new("check", "Bring-up checklist", move |_, context| settings.run(context)))
 }
 
-async fn reset(
-    State(app): Shared,
-    headers: HeaderMap,
-    Body(Nothing {}): Body<Nothing>,
-) -> Result<Json<Begun>, Failure> {
-    require_control(&app, &headers)?;
+async fn reset(State(app): Shared, Body(Nothing {}): Body<Nothing>) -> Result<Json<Begun>, Failure> {
     let rig = RigAddress::Open(connected(&app)?);
-    let work = move |_: &App, context: &Context<'_>| figures(board::reset(&rig, context)?);
-    begin(&app, Task { kind: "reset", title: "Reset the board".into(), work: Box::new(work) })
+    begin(&app, Task::new("reset", "Reset the board", move |_, context| board::reset(&rig, context)))
 }
 
-async fn live(
-    State(app): Shared,
-    headers: HeaderMap,
-    Body(request): Body<LiveRequest>,
-) -> Result<Json<Done>, Failure> {
-    require_control(&app, &headers)?;
+async fn live(State(app): Shared, Body(request): Body<LiveRequest>) -> Result<Json<Done>, Failure> {
     let info = app.state().rig.info;
     let limit = |name: &str| info.as_ref().and_then(|info| u32::try_from(info[name].as_u64()?).ok());
     let min_us = limit("exposure_min_us").unwrap_or(1);
@@ -334,17 +294,8 @@ async fn list_alarms(State(app): Shared) -> Result<Json<Alarms>, Failure> {
     Ok(Json(Alarms { figures }))
 }
 
-async fn clear(
-    State(app): Shared,
-    headers: HeaderMap,
-    Body(request): Body<Clear>,
-) -> Result<Json<Begun>, Failure> {
-    require_control(&app, &headers)?;
+async fn clear(State(app): Shared, Body(Clear { number }): Body<Clear>) -> Result<Json<Begun>, Failure> {
     let rig = RigAddress::Open(connected(&app)?);
-    let work =
-        move |_: &App, context: &Context<'_>| figures(alarms::alarms(&rig, Some(request.number), context)?);
-    begin(
-        &app,
-        Task { kind: "alarm", title: format!("Clear alarm {}", request.number), work: Box::new(work) },
-    )
+    let work = move |_: &App, context: &Context<'_>| alarms::alarms(&rig, Some(number), context);
+    begin(&app, Task::new("alarm", format!("Clear alarm {number}"), work))
 }

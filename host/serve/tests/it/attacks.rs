@@ -19,7 +19,7 @@ pub(super) const TOKEN: &str = "0123456789abcdef0123";
 
 pub(super) fn network(folder: &Path) -> Listen {
     let file = folder.join("token");
-    fs::write(&file, TOKEN).unwrap();
+    fs::write(&file, format!("{TOKEN}\n")).unwrap();
     let (address, token) = ("127.0.0.1:0".parse().unwrap(), Token::read(&file).unwrap());
     Listen::Network { address, token, names: vec!["rig.lab.example".into()] }
 }
@@ -108,9 +108,15 @@ fn hosts_and_origins_of_others_are_refused_in_every_form() {
         let upgrade = [("origin", origin), ("upgrade", "websocket"), ("connection", "upgrade")];
         assert_eq!(served.ask("GET", "/api/socket", &upgrade, "").status, 403, "socket from {origin:?}");
     }
+    for origin in [format!("https://{own}"), own.clone()] {
+        let asked = served.ask("POST", "/api/stop", &[("origin", &origin)], "{}");
+        assert_eq!(asked.status, 403, "its own host without its scheme: {origin}");
+    }
     let status =
         raw(&served, &format!("GET /api/state HTTP/1.1\r\nhost: {own}\r\nconnection: close\r\n\r\n"));
     assert_eq!(status, 200, "its own name");
+    let origin = format!("http://{own}");
+    assert_eq!(served.ask("POST", "/api/stop", &[("origin", &origin)], "{}").status, 200, "its own page");
 }
 
 #[test]
@@ -118,6 +124,7 @@ fn no_path_leaves_the_session_or_a_capture() {
     let served = Served::captures_only();
     put(&served, "pair-001", 0);
     fs::write(served.session.parent().unwrap().join("secret"), "private content").unwrap();
+    fs::write(served.session.join("secret"), "private content").unwrap();
     fs::write(served.session.join("pair-001/.hidden"), "private content").unwrap();
     fs::create_dir_all(served.session.join("people")).unwrap();
     fs::write(served.session.join("people/private.toml"), "private content").unwrap();

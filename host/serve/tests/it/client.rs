@@ -11,7 +11,6 @@ use std::{
     time::{Duration, Instant},
 };
 
-use farnear_protocol::Micros;
 use farnear_scripted_board::{Faults, plug_in};
 use farnear_serve::{Limits, Listen, ServeError, ServeSettings, serve, stopping::StopError};
 use farnear_workflows::{
@@ -32,10 +31,8 @@ pub fn settings(folder: &Path, listen: Listen) -> ServeSettings {
     fs::create_dir_all(&shots).unwrap();
     let camera = CameraSettings {
         address: CameraAddress::Folder(shots),
-        exposure: Micros(5_000),
         image_wait: Duration::from_secs(5),
-        settings: Vec::new(),
-        light: None,
+        ..CameraSettings::default()
     };
     let (session, limits) = (folder.join("session"), Limits::default());
     ServeSettings { rig: None, camera, session, optics: None, listen, limits }

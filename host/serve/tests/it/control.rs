@@ -1,5 +1,10 @@
 //! One browser has control; nothing moves after it has disconnected.
 
+use std::{
+    io::{Read, Write},
+    net::TcpStream,
+};
+
 use farnear_scripted_board::{Faults, plug_in};
 use farnear_workflows::rig::RigAddress;
 
@@ -31,6 +36,33 @@ fn one_browser_has_control_and_hands_it_over_on_request() {
     assert_eq!(served.post("/api/control/answer", &first.secret, &give).status, 200);
     served.state_when(|state| state["control"]["holder"] == second.client);
     assert_eq!(served.post("/api/rig/move", &first.secret, FINE).status, 403);
+}
+
+#[test]
+fn control_that_is_lost_while_a_body_arrives_counts_for_nothing() {
+    let served = Served::captures_only();
+    put(&served, "pair-001", 0);
+    let (first, second) = (Socket::open(&served), Socket::open(&served));
+    let body = r#"{"to":"pair-002"}"#;
+    let mut slow = TcpStream::connect(&served.address).unwrap();
+    let head = format!(
+        "POST /api/captures/pair-001/rename HTTP/1.1\r\nhost: {}\r\nconnection: close\r\nx-farnear-client: {}\r\n\
+         content-type: application/json\r\ncontent-length: {}\r\n\r\n{}",
+        served.address,
+        first.secret,
+        body.len(),
+        &body[..1]
+    );
+    slow.write_all(head.as_bytes()).unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(300)); // the server reads the body
+    assert_eq!(served.post("/api/control/request", &second.secret, "{}").status, 200);
+    let give = format!(r#"{{"to":{},"give":true}}"#, second.client);
+    assert_eq!(served.post("/api/control/answer", &first.secret, &give).status, 200);
+    slow.write_all(&body.as_bytes()[1..]).unwrap();
+    let mut answer = String::new();
+    slow.read_to_string(&mut answer).unwrap();
+    assert!(answer.starts_with("HTTP/1.1 403"), "{answer}");
+    assert!(served.session.join("pair-001").is_dir());
 }
 
 #[test]

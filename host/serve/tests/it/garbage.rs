@@ -1,7 +1,5 @@
 //! Ten thousand invalid messages: each is answered or ends its connection, and the page is still served.
 
-use std::{io::Write, net::TcpStream};
-
 use farnear_scripted_board::Faults;
 
 use super::client::{Served, Socket};
@@ -86,14 +84,4 @@ fn ten_thousand_malformed_messages_change_nothing() {
     let begun = served.post("/api/rig/move", &holder.secret, targets).json();
     let ended = served.ended("job", &begun["job"]);
     assert_eq!(ended["phase"], "done", "{ended:#}");
-}
-
-#[test]
-fn a_silent_connection_delays_no_other() {
-    let served = Served::captures_only();
-    let silent: Vec<_> = (0..50).map(|_| TcpStream::connect(&served.address).unwrap()).collect();
-    let mut half = TcpStream::connect(&served.address).unwrap();
-    half.write_all(b"POST /api/stop HTTP/1.1\r\nhost: local").unwrap();
-    assert_eq!(served.get("/api/state").status, 200);
-    drop(silent);
 }

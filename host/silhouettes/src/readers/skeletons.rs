@@ -5,36 +5,17 @@ use crate::silhouette::capsule::{Capsule, Point3};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Layout {
-    pub joints: &'static [&'static str],
+    /// Joints of a frame.
+    pub joints: usize,
     /// Two joints and a radius in millimetres; equal joints make a ball.
     pub bones: &'static [(usize, usize, f64)],
     pub unit_mm: f64,
 }
 
-/// First-generation Kinect, metres (as in UTKinect-Action3D).
+/// First-generation Kinect, metres (as in UTKinect-Action3D): centre of the hips, spine, centre of the shoulders, head; left
+/// shoulder, elbow, wrist, hand; the right ones; left hip, knee, ankle, foot; the right ones.
 pub const KINECT_20: Layout = Layout {
-    joints: &[
-        "hip centre",
-        "spine",
-        "shoulder centre",
-        "head",
-        "left shoulder",
-        "left elbow",
-        "left wrist",
-        "left hand",
-        "right shoulder",
-        "right elbow",
-        "right wrist",
-        "right hand",
-        "left hip",
-        "left knee",
-        "left ankle",
-        "left foot",
-        "right hip",
-        "right knee",
-        "right ankle",
-        "right foot",
-    ],
+    joints: 20,
     bones: &[
         (3, 3, 100.0),
         (2, 3, 60.0),
@@ -59,25 +40,10 @@ pub const KINECT_20: Layout = Layout {
     unit_mm: 1000.0,
 };
 
-/// Florence 3D Actions, millimetres.
+/// Florence 3D Actions, millimetres: head, neck, spine; left shoulder, elbow, hand; the right ones; left hip, knee, foot; the right
+/// ones.
 pub const FLORENCE_15: Layout = Layout {
-    joints: &[
-        "head",
-        "neck",
-        "spine",
-        "left shoulder",
-        "left elbow",
-        "left hand",
-        "right shoulder",
-        "right elbow",
-        "right hand",
-        "left hip",
-        "left knee",
-        "left foot",
-        "right hip",
-        "right knee",
-        "right foot",
-    ],
+    joints: 15,
     bones: &[
         (0, 0, 100.0),
         (0, 1, 60.0),
@@ -146,21 +112,21 @@ pub fn read_cells(bytes: &[u8], layout: &Layout) -> Result<Vec<SkeletonClip>, Sk
             subject,
             repetition,
             found,
-            joints: layout.joints.len(),
+            joints: layout.joints,
         };
         let Array::Numeric { dimensions, values } = cell else { return Err(form(Vec::new())) };
         if values.is_empty() {
             continue;
         }
         // A single frame lacks the third dimension.
-        if dimensions.len() < 2 || dimensions[0] != 3 || dimensions[1] != layout.joints.len() {
+        if dimensions.len() < 2 || dimensions[0] != 3 || dimensions[1] != layout.joints {
             return Err(form(dimensions));
         }
         let unit = layout.unit_mm;
         // [x, z, y] mirrors the body, which `kinect` and `ntu` rotate to [x, -z, y]. It stays because published figures
         // of these sets are measured on it; a rotation would change the views.
         let frames = values
-            .chunks_exact(3 * layout.joints.len())
+            .chunks_exact(3 * layout.joints)
             .map(|frame| frame.chunks_exact(3).map(|p| [unit * p[0], unit * p[2], unit * p[1]]).collect())
             .collect();
         clips.push(SkeletonClip { activity, subject, repetition, frames });

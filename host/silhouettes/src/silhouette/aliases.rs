@@ -151,11 +151,12 @@ fn matched(simple: &[String], template: &Template, naming: Option<&Naming>) -> M
         }
     };
     for (place, name) in simple.iter().enumerate() {
-        for (theirs, ours) in naming.into_iter().flat_map(|naming| naming.names) {
+        let all = naming.into_iter().flat_map(|naming| naming.names);
+        for (ours, theirs) in all.flat_map(|(ours, all)| all.split(' ').map(move |theirs| (ours, theirs))) {
             for [side, short] in [["left", "l"], ["right", "r"]] {
                 // `UpperLeg_L` is `LUpperLeg`.
                 let turned = theirs.strip_prefix('@').map(|joint| format!("{joint}@"));
-                let mut forms = std::iter::once(*theirs).chain(turned.as_deref());
+                let mut forms = std::iter::once(theirs).chain(turned.as_deref());
                 if forms.any(|form| [side, short].iter().any(|side| *name == form.replace('@', side))) {
                     let capital = if side == "left" { "Left" } else { "Right" };
                     let side = if template.name == "bvh" { capital } else { side };

@@ -154,7 +154,7 @@ pub fn read(list: &Path, context: &Context<'_>) -> Result<Vec<(Array2<f32>, f64)
         let map = read_map(&file)?;
         if let Some(own) = map.part {
             let first = *part.get_or_insert(own);
-            if own != first {
+            if own != first && (own.bin == first.bin || (own.x, own.y) != (first.x, first.y)) {
                 let value = format!("{}, which begins at {},{}", file.display(), own.x, own.y);
                 let expected = format!("maps of one region: the first begins at {},{}", first.x, first.y);
                 return Err(WorkflowError::parameter("patterns", value, expected));

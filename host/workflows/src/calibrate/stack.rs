@@ -381,11 +381,11 @@ fn read(
             };
             image.pixels = frames.correct_below(image.pixels.view(), clipped)?;
         }
-        filled += fill_specks(&mut image.pixels).len();
+        filled += fill_specks(&mut image.pixels, image.samples == Samples::Float).len();
         let holes = image.pixels.iter().filter(|value| !value.is_finite()).count();
         if holes > 0 {
             let expected = format!(
-                "expected a value in each pixel, but {holes} have none (NaN or transparent): crop or fill them"
+                "expected a value in each pixel, but {holes} have none (NaN, transparent, or 1000 times the usual one): crop or fill them"
             );
             return Err(WorkflowError::parameter("stack", images[index].display(), expected));
         }
@@ -398,7 +398,7 @@ fn read(
     })?;
     if filled > 0 {
         context.progress.warn(&format!(
-            "{filled} single pixels of the slices have no value (NaN or transparent): the mean of their neighbours replaces each"
+            "{filled} single pixels of the slices have no value (NaN, transparent, or 1000 times the usual one): the mean of their neighbours replaces each"
         ));
     }
     if let Some(white) = white.get(request.white_level.is_some()) {

@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use farnear_capture::camera::{CameraError, Frame};
+use farnear_capture::camera::{CameraError, Frame, pairing::counted};
 use farnear_files::{
     image_file::{encode_png, encode_tiff},
     staging::Staging,
@@ -180,8 +180,10 @@ fn write(staged: &Staging, number: usize, frame: &Frame, format: PictureFormat) 
 }
 
 fn figures(record: &GrabRecord) -> Option<GrabFigures> {
-    let (first, last) = (record.frame.first()?, record.frame.last()?);
-    let counted = first.count.zip(last.count).map(|(first, last)| last.wrapping_sub(first));
+    let last = record.frame.last()?;
+    // From frame to frame, because a short count wraps.
+    let advance = |two: &[FrameRecord]| u64::try_from(counted(two[0].count?, two[1].count?)).ok();
+    let counted = record.frame.windows(2).map(advance).sum::<Option<u64>>();
     Some(GrabFigures {
         frames: record.frame.len(),
         width: last.width,

@@ -19,7 +19,7 @@ use farnear_files::{
 use ndarray::ArrayView2;
 use rayon::prelude::*;
 
-use super::{Computed, DepthRequest, Inputs, part::Part, record::record};
+use super::{Computed, DepthRequest, Inputs, record::record};
 use crate::{
     MADE_BY,
     context::Context,
@@ -198,18 +198,14 @@ impl<'a> Results<'a> {
         to.write_all(&view::view_png(self.depth(), self.confidence()).map_err(io::Error::other)?)
     }
 
-    fn part(&self) -> Option<Part> {
-        self.inputs.cut.map(|cut| cut.part())
-    }
-
     fn mesh(&self, to: &mut Sink) -> io::Result<()> {
-        let lateral = lateral(&self.inputs.optics, self.part());
+        let lateral = lateral(&self.inputs.optics, self.inputs.part);
         mesh::write(self.depth(), self.computed.image.view(), lateral, "mm", to)
     }
 
     fn glb(&self, to: &mut Sink) -> io::Result<()> {
         let projection =
-            projection(&self.inputs.optics, self.part()).ok_or_else(|| io::Error::other(NO_SCALE))?;
+            projection(&self.inputs.optics, self.inputs.part).ok_or_else(|| io::Error::other(NO_SCALE))?;
         glb::write(self.depth(), self.computed.image.view(), projection, to)
     }
 

@@ -1,6 +1,6 @@
 //! Depth of a part of the images.
 
-use farnear_depth::prepare::CameraFrames;
+use farnear_depth::{optics::binned_place, prepare::CameraFrames};
 use ndarray::{Array2, s};
 use serde::{Deserialize, Serialize};
 
@@ -21,17 +21,36 @@ pub struct Part {
     pub y: usize,
     pub image_width: usize,
     pub image_height: usize,
+    /// Pixels of the images per side of a pixel of the map.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub bin: usize,
+}
+
+fn one() -> usize {
+    1
+}
+
+fn is_one(bin: &usize) -> bool {
+    *bin == 1
 }
 
 impl Part {
+    /// Images of (height, width) of which averaging leaves out columns or rows at the end.
+    pub(super) fn of_bins((height, width): (usize, usize), bin: usize) -> Option<Self> {
+        let is_less = !width.is_multiple_of(bin) || !height.is_multiple_of(bin);
+        is_less.then_some(Self { x: 0, y: 0, image_width: width, image_height: height, bin })
+    }
+
     /// Whether a map of (height, width) can be this part.
     pub fn fits(&self, (height, width): (usize, usize)) -> bool {
-        self.x + width <= self.image_width && self.y + height <= self.image_height
+        self.x + width * self.bin <= self.image_width && self.y + height * self.bin <= self.image_height
     }
 
     /// Optical axis (centre of the images) in the map: column and row.
     pub fn axis_px(&self) -> [f64; 2] {
-        let of = |size: usize, begin: usize| 0.5 * (size as f64 - 1.0) - begin as f64;
+        let of = |size: usize, begin: usize| {
+            binned_place(0.5 * (size as f64 - 1.0) - begin as f64, self.bin as f64)
+        };
         [of(self.image_width, self.x), of(self.image_height, self.y)]
     }
 }
@@ -87,10 +106,28 @@ impl Cut {
 
     pub fn part(&self) -> Part {
         let Rectangle { x, y, .. } = self.wanted;
-        Part { x, y, image_width: self.image.1, image_height: self.image.0 }
+        Part { x, y, image_width: self.image.1, image_height: self.image.0, bin: 1 }
     }
 }
 
 fn of<T: Clone>(map: &Array2<T>, Rectangle { x, y, width, height }: Rectangle) -> Array2<T> {
     map.slice(s![y..y + height, x..x + width]).to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_axis_of_averaged_images_is_their_middle() {
+        assert_eq!(Part::of_bins((480, 640), 4), None);
+        // Column 321 is the middle of 643; 160 averaged columns have theirs at 79.5.
+        let part = Part::of_bins((480, 643), 4).unwrap();
+        assert_eq!(part.axis_px(), [79.875, 59.5]);
+        assert!(part.fits((120, 160)) && !part.fits((120, 161)));
+        let kept: Part = toml::from_str(&toml::to_string(&part).unwrap()).unwrap();
+        assert_eq!(kept, part);
+        let whole: Part = toml::from_str("x = 5\ny = 0\nimage_width = 9\nimage_height = 9\n").unwrap();
+        assert_eq!((whole.bin, whole.axis_px()), (1, [-1.0, 4.0]));
+    }
 }

@@ -39,7 +39,7 @@ struct Record<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     camera: Option<String>,
     min_confidence: f32,
-    /// Position of the map in the images, if of a part.
+    /// Position of the map in the images, if of a part, or if averaging left out columns or rows.
     #[serde(skip_serializing_if = "Option::is_none")]
     part: Option<Part>,
     settings: Settings,
@@ -82,7 +82,7 @@ pub fn record(
         white_level: settings.white_level,
         camera: settings.camera_frames.as_deref().map(name_of),
         min_confidence: settings.min_confidence,
-        part: inputs.cut.map(|cut| cut.part()),
+        part: inputs.part,
         prepared: computed.report,
         no_depth: &computed.lost,
         settings: Settings { threads: rayon::current_num_threads(), ..settings.computation() },

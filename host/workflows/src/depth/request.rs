@@ -26,8 +26,8 @@ use crate::{
     request::{self, PathKind, Request},
 };
 
-/// Least largest blur of averaged pixels, px: on point-sampled texture at 1.35 px depth is off by four deviations.
-const LEAST_BINNED_BLUR_PX: f64 = 1.5;
+/// Least largest blur, px: on point-sampled texture at 1.35 px depth is off by four deviations.
+const LEAST_BLUR_PX: f64 = 1.5;
 
 /// Compute a depth map from a far- and a near-focused image.
 ///
@@ -265,7 +265,7 @@ impl DepthRequest {
     pub fn bin_for(&self, optics: &Optics, is_mosaic: bool, doubts: &mut Vec<OpticsDoubt>) -> usize {
         let bin = self.bin.unwrap_or_else(|| self.chosen_bin(optics, is_mosaic, doubts));
         let blur_px = optics.max_blur_px() / bin as f64;
-        if bin > 1 && blur_px < LEAST_BINNED_BLUR_PX {
+        if blur_px < LEAST_BLUR_PX {
             doubts.push(OpticsDoubt::LittleBlur { blur_px, bin });
         }
         bin

@@ -205,11 +205,16 @@ where
 }
 
 /// Brightness of each of the images, which are not compared, relative to the usual one.
-pub(super) fn gains<S: Slices + ?Sized>(images: &S) -> std::result::Result<Vec<f64>, S::Error> {
+pub(super) fn gains<S: Slices + ?Sized>(images: &S) -> Result<Vec<f64>, S::Error> {
+    let blocks = blocks(images)?;
+    Ok(brightness::gains(&blocks, &(0..blocks.len()).collect::<Vec<_>>()))
+}
+
+/// Brightness of each of the images by blocks.
+pub(super) fn blocks<S: Slices + ?Sized>(images: &S) -> Result<Vec<Vec<f64>>, S::Error> {
     let of_frame =
         |index: usize| Ok(brightness::of_blocks(images.rows(index, 0..images.dim(index).0)?.view()));
-    let blocks = (0..images.count()).map(of_frame).collect::<std::result::Result<Vec<_>, S::Error>>()?;
-    Ok(brightness::gains(&blocks, &(0..blocks.len()).collect::<Vec<_>>()))
+    (0..images.count()).map(of_frame).collect()
 }
 
 /// The two nearest frames of the scene.

@@ -9,11 +9,12 @@ use std::{
 };
 
 use farnear_depth::{
+    brightness::Trend,
     focus_stack::{Slices, StackError},
     mosaic::{self, is_mosaic},
     optics::Distortion,
     prepare::{
-        straightened,
+        erase_wild, straightened,
         warp::{Warp, resample},
     },
 };
@@ -27,6 +28,7 @@ use ndarray::{Array2, ArrayView2, CowArray, Ix2};
 use super::{
     FocusStackRequest,
     black_border::{self, Borders},
+    frames,
 };
 use crate::{
     context::Context,
@@ -57,8 +59,12 @@ const AROUND_SPECK: usize = 5;
 /// Least part of a speck in a moved pixel.
 const SPECK: f32 = 0.05;
 
-/// Fills single pixels and small groups without a value by the mean of their neighbours; returns where they are.
-pub(crate) fn fill_specks(image: &mut Array2<f32>) -> Vec<(usize, usize)> {
+/// Fills single pixels and small groups without a value, or of floats with a wild one, by the mean of their neighbours; returns where
+/// they are.
+pub fn fill_specks(image: &mut Array2<f32>, are_floats: bool) -> Vec<(usize, usize)> {
+    if are_floats {
+        erase_wild(image);
+    }
     if image.iter().all(|value| value.is_finite()) {
         return Vec::new();
     }
@@ -148,9 +154,10 @@ impl<'a> Images<'a> {
                 Samples::Float => 0.0,
             };
             read.code_step = read.code_step.max(code_step);
-            without_value += image.pixels.iter().filter(|value| !value.is_finite()).count();
             black.push((black_border::of_image(&image.pixels, code_step), code_step));
-            read.specks.push(fill_specks(&mut image.pixels));
+            let specks = fill_specks(&mut image.pixels, image.samples == Samples::Float);
+            without_value += specks.len() + image.pixels.iter().filter(|value| !value.is_finite()).count();
+            read.specks.push(specks);
             read.images.push((end, image.pixels.dim()));
             read.write(index, image.pixels.view())?;
             end += (PIXEL * image.pixels.len()) as u64;
@@ -161,7 +168,7 @@ impl<'a> Images<'a> {
         }
         if without_value > 0 {
             warnings.push(format!(
-                "{without_value} pixels of the images have no value (NaN or transparent): the map has holes there"
+                "{without_value} pixels of the images have no value (NaN, transparent, or 1000 times the usual one): the map has holes there"
             ));
         }
         read.erase_black(&black)?;
@@ -205,6 +212,19 @@ impl<'a> Images<'a> {
 
     pub fn divide_by(&mut self, gains: &[f64]) {
         self.gains = gains.iter().map(|gain| *gain as f32).collect();
+    }
+
+    /// Divides out vignetting that changes over the stack, after the images' brightness; returns its largest change as a logarithm, 0
+    /// without.
+    pub fn even_vignetting(&self, positions: &[f64]) -> Result<f64> {
+        let Some(trend) = Trend::of(&frames::blocks(self)?, positions) else { return Ok(0.0) };
+        for (index, position) in positions.iter().enumerate() {
+            self.context.cancel.check("evening out the stack")?;
+            let mut image = self.stored(index, 0..self.dim(index).0)?;
+            trend.divide(&mut image, *position);
+            self.write(index, image.view())?;
+        }
+        Ok(trend.change)
     }
 
     /// Removes the lens' distortion from all images and moves each by its warp, NaN where it does not show the scene. Where the
@@ -319,10 +339,14 @@ mod tests {
         image[(7, 0)] = f32::NAN;
         image.row_mut(0).fill(f32::NAN);
         let specks = [(4, 4), (6, 6), (7, 0), (8, 8)];
-        assert_eq!(fill_specks(&mut image), specks);
+        assert_eq!(fill_specks(&mut image, false), specks);
         assert_eq!(specks.map(|at| image[at]), [0.5; 4]);
         assert!(image.row(0).iter().all(|value| value.is_nan()));
-        assert_eq!(fill_specks(&mut Array2::from_elem((3, 3), 1.0)), []);
+        assert_eq!(fill_specks(&mut Array2::from_elem((3, 3), 1.0), false), []);
+        let mut wild = Array2::from_elem((9, 9), 0.5);
+        wild[(4, 4)] = 1e30;
+        assert_eq!(fill_specks(&mut wild.clone(), false), []);
+        assert_eq!((fill_specks(&mut wild, true), wild[(4, 4)]), (vec![(4, 4)], 0.5));
     }
 
     #[test]

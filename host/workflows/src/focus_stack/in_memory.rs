@@ -1,6 +1,7 @@
 //! Stacks whose images are in memory.
 
 use farnear_depth::{
+    brightness::{Trend, of_blocks},
     focus_stack::StackMap,
     prepare::{
         align::Model,
@@ -54,7 +55,7 @@ pub fn prepare_stack(
     context: &Context<'_>,
 ) -> Result<PreparedStack> {
     let borders: Vec<Borders> = images.iter().map(|image| black_border::of_image(image, code_step)).collect();
-    let mut specks: Vec<_> = images.iter_mut().map(fill_specks).collect();
+    let mut specks: Vec<_> = images.iter_mut().map(|image| fill_specks(image, code_step == 0.0)).collect();
     let erased = black_border::of_registration(&borders);
     for image in &mut images {
         black_border::erase(image, code_step, erased);
@@ -70,15 +71,20 @@ pub fn prepare_stack(
         frames.warps.remove(*index);
         frames.gains.remove(*index);
     }
+    images.iter_mut().zip(&frames.gains).for_each(|(image, gain)| even(image, *gain as f32, code_step > 0.0));
     let mut unseen = None;
     for (index, image) in images.iter_mut().enumerate() {
         context.cancel.check("aligning the stack")?;
-        let (warp, gain) = (&frames.warps[index], frames.gains[index]);
+        let warp = &frames.warps[index];
         mark_specks(&mut unseen, image.dim(), &specks[index], None, warp);
-        even(image, gain as f32, code_step > 0.0);
         if *warp != Warp::IDENTITY {
             *image = resample(image.view(), warp);
         }
+    }
+    // Of aligned images, because a lens that breathes in uneven light looks alike.
+    let blocks: Vec<Vec<f64>> = images.iter().map(|image| of_blocks(image.view())).collect();
+    if let Some(trend) = Trend::of(&blocks, &positions) {
+        images.iter_mut().zip(&positions).for_each(|(image, position)| trend.divide(image, *position));
     }
     let moved_px = model.and(images.first()).map(|first| frames::farthest_px(&frames.warps, first.dim()));
     let code_step = code_step / darkest(frames.gains.iter().map(|gain| *gain as f32));
@@ -116,14 +122,35 @@ mod tests {
     fn a_pixel_without_a_value_has_no_place_and_its_neighbours_have_one() {
         let mut images = stack();
         images[2][(20, 30)] = f32::NAN;
+        images[3][(30, 40)] = 1e30;
         let positions: Vec<f64> = (0..7).map(f64::from).collect();
-        let prepared = prepare_stack(images, 0.0, positions, None, true, &Context::unattended()).unwrap();
+        let prepared = prepare_stack(images, 0.0, positions, None, false, &Context::unattended()).unwrap();
+        assert_eq!(prepared.left_out, [0; 0]);
         let views: Vec<ArrayView2<f32>> = prepared.images.iter().map(|image| image.view()).collect();
         let settings = StackSettings { median_px: 1, guided_px: 0.0, ..StackSettings::default() };
         let mut map = depth_from_positions(&views[..], &prepared.positions, &settings).unwrap();
         prepared.withhold(&mut map);
         assert!(map.place[(20, 30)].is_nan() && map.reliability[(20, 30)] == 0.0);
         assert!(map.place[(20, 31)].is_finite() && map.place[(21, 30)].is_finite());
+        assert!(map.place[(30, 40)].is_nan() && map.place[(30, 41)].is_finite());
+    }
+
+    #[test]
+    fn vignetting_that_changes_over_the_stack_is_evened_out() {
+        let mut images = stack();
+        for (number, image) in images.iter_mut().enumerate() {
+            let factor = |x: usize| 1.0 - 0.05 * number as f32 * (x as f32 / 64.0 - 0.2);
+            image.indexed_iter_mut().for_each(|((_, x), value)| *value *= factor(x));
+        }
+        let positions: Vec<f64> = (0..7).map(f64::from).collect();
+        let even = prepare_stack(images, 0.0, positions, None, false, &Context::unattended()).unwrap().images;
+        let ratio = |columns: std::ops::Range<usize>| {
+            let mean = |index: usize| even[index].slice(ndarray::s![.., columns.clone()]).sum();
+            mean(6) / mean(0)
+        };
+        // Before, 1.05 and 0.8.
+        let ratios = [ratio(0..6), ratio(58..64)];
+        assert!((ratios[0] / ratios[1] - 1.0).abs() < 0.05, "{ratios:?}");
     }
 
     #[test]

@@ -83,6 +83,7 @@ fn of_other_unit(name: &str, maps: &[Array2<f32>; 2]) -> Option<String> {
 fn shared_unit(name: &'static str, first: &MapFile, second: &MapFile) -> crate::Result<Unit> {
     if let (Some(a), Some(b)) = (first.part, second.part)
         && a != b
+        && (a.bin == b.bin || (a.x, a.y) != (b.x, b.y))
     {
         let expected = format!("the first map begins at {},{}, and both must show one region", a.x, a.y);
         return Err(WorkflowError::parameter(name, format!("(begins at {},{})", b.x, b.y), expected));

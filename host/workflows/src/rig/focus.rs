@@ -27,7 +27,7 @@ use super::{
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
-    figures::rounded,
+    figures::{rounded, rounded_for},
     measure::Rectangle,
     optics::GivenOptics,
     request::{PathKind, Request},
@@ -188,12 +188,13 @@ fn figures(optics: Optics, focus: &Focus) -> Result<FocusFigures> {
     let mut file = OpticsFile::from(optics);
     file.focus.far_mm = far_mm;
     let range = file.check()?.working_range();
+    let of_range = |mm: f64| rounded_for(range.far_mm - range.near_mm, mm, 4);
     Ok(FocusFigures {
         m1_mm: rounded(focus.sensor_mm, 6),
         m2_mm: rounded(range.sensor_near_mm, 6),
-        far_mm: rounded(range.far_mm, 4),
-        near_mm: rounded(range.near_mm, 4),
-        alpha0_mm: rounded(range.alpha0_mm, 4),
+        far_mm: of_range(range.far_mm),
+        near_mm: of_range(range.near_mm),
+        alpha0_mm: of_range(range.alpha0_mm),
         sensor_travel_mm: rounded(range.sensor_travel_mm, 6),
         coarse_um: um(focus.coarse),
         fine_um: um(focus.fine),
@@ -213,6 +214,8 @@ fn object_mm(focal_length_mm: f64, sensor_mm: f64) -> Result<f64> {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use farnear_protocol::message::PositionState;
 
     use super::*;
@@ -227,6 +230,25 @@ mod tests {
         assert!(!is_placed(stands(unknown, 7), stands(homed, 0)), "it had to be homed");
         assert!(!is_placed(stands(homed, 0), stands(homed, 0)), "it was homed by the run before");
         assert!(is_placed(stands(homed, 5_800_000), stands(homed, 5_800_000)));
+    }
+
+    #[test]
+    fn the_figures_of_a_microscope_keep_their_digits() {
+        let text = "[lens]\nfocal_length_mm = 25.0\nf_number = 1.4\n[sensor]\npixel_um = 2.4\n[focus]\nfar_mm = 47.5\nmax_blur_px = 2.5\n";
+        let given = GivenOptics::parse(text, "optics.toml".as_ref()).unwrap();
+        let focus = Focus {
+            sensor_mm: 52.7781,
+            coarse: Nanometres(0),
+            fine: Nanometres(0),
+            places: 1,
+            exposures: 1,
+            board: Duration::ZERO,
+            sweep: Vec::new(),
+        };
+        let found = figures(given.optics, &focus).unwrap();
+        // 25 + 25 x 25 / (m - 25) at 52.7781 mm and 16.8 um further: 13.6 um apart.
+        assert!((found.far_mm - 47.499_739).abs() < 6e-6, "{found:?}");
+        assert!((found.near_mm - 47.486_139_5).abs() < 6e-6, "{found:?}");
     }
 
     #[test]

@@ -13,7 +13,7 @@ use ndarray::Axis;
 use super::{
     RigAddress,
     camera::{CameraAddress, CameraSettings, OTHERS},
-    pair::{CaptureRequest, PairFigures, noted, warn_of_images},
+    pair::{CaptureRequest, PairFigures, noted, unlit, warn_of_images},
 };
 use crate::{
     context::Context,
@@ -65,6 +65,9 @@ pub(super) fn capture(settings: &CaptureRequest, context: &Context<'_>) -> Resul
     let mut pair = capture_behind_mirror(client, cameras, &sensor, further_um * 1e-3, &exposures, say)?;
     if settings.second_mirrored {
         pair.near.image.pixels.invert_axis(Axis(1));
+    }
+    if let Some(doubt) = camera.light_with(Some(&optics)).and_then(|_| unlit(&pair)) {
+        context.progress.warn(&doubt);
     }
     warn_of_images(&pair, context);
     let mut record = noted(&pair, &equipped, &optics, camera, *averaged);

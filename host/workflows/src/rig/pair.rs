@@ -2,6 +2,7 @@ use std::path::PathBuf;
 
 use farnear_capture::{
     camera::Image,
+    expose::unlit_note,
     pair::{Exposures, Pair, capture_pair},
     plan::SensorPair,
     record::{CaptureRecord, begin_folder, finish_folder, record_of},
@@ -235,7 +236,8 @@ fn take_by(
     let EquippedRig { camera, rig } = equipped;
     let say = &mut |what: &str| context.info(what);
     let pair = capture_pair(&rig.client, camera.as_mut(), &sensor, &exposures, say)?;
-    if let Some(doubt) = doubt_of_light(&pair) {
+    let lit = settings.light_with(Some(optics));
+    if let Some(doubt) = lit.and_then(|_| unlit(&pair)).or_else(|| doubt_of_light(&pair)) {
         context.progress.warn(&doubt);
     }
     warn_of_images(&pair, context);
@@ -254,6 +256,11 @@ pub(super) fn warn_of_images(pair: &Pair, context: &Context<'_>) {
             context.progress.warn(&format!("the {which} image: {warning}"));
         }
     }
+}
+
+/// Doubt about a pair whose exposures the board's light missed in part.
+pub(super) fn unlit(pair: &Pair) -> Option<String> {
+    [&pair.far, &pair.near].into_iter().find_map(|taken| unlit_note(&taken.record))
 }
 
 /// Doubt about a pair whose images differ in brightness.

@@ -19,7 +19,7 @@ use crate::{
     clock,
     context::Context,
     error::{Result, WorkflowError},
-    figures::rounded,
+    figures::{rounded, rounded_for},
     measure::{Rectangle, fit},
     optics::GivenOptics,
     quantile,
@@ -228,17 +228,19 @@ fn figures(
             "expected a textured plane within the working range",
         )
     })?;
-    let predicted = predicted.and_then(|map| quantile::of_map(map.slice(window), 0.5));
+    let predicted_mm = predicted.and_then(|map| quantile::of_map(map.slice(window), 0.5)).unwrap_or_default();
+    let noise_mm = quantile::of_values(noise, 0.5).unwrap_or_default();
+    let of_noise = |mm: f64| rounded_for(noise_mm.max(predicted_mm), mm, 4);
     Ok(QualityFigures {
         time: None,
         pairs: maps.len(),
         fill_rate: rounded(filled as f64 / (pixels * maps.len()).max(1) as f64, 6),
-        mean_mm: rounded(plane.z_mm, 4),
-        plane_rms_mm: rounded(plane.rms_mm, 4),
+        mean_mm: of_noise(plane.z_mm),
+        plane_rms_mm: of_noise(plane.rms_mm),
         tilt_deg: rounded(plane.tilt_deg, 3),
-        temporal_noise_mm: rounded(quantile::of_values(noise, 0.5).unwrap_or_default(), 4),
-        predicted_noise_mm: rounded(predicted.unwrap_or_default(), 4),
-        accuracy_mm: true_mm.map(|true_mm| rounded(plane.z_mm - true_mm, 4)),
+        temporal_noise_mm: of_noise(noise_mm),
+        predicted_noise_mm: of_noise(predicted_mm),
+        accuracy_mm: true_mm.map(|true_mm| of_noise(plane.z_mm - true_mm)),
     })
 }
 
@@ -283,6 +285,15 @@ mod tests {
         assert!((found.temporal_noise_mm - (16.0f64 / 3.0).sqrt()).abs() < 1e-3, "{found:?}");
         assert_eq!((found.fill_rate, found.plane_rms_mm, found.tilt_deg), (1.0, 0.0, 0.0));
         assert_eq!((found.mean_mm, found.accuracy_mm, found.predicted_noise_mm), (900.0, Some(1.0), 2.5));
+    }
+
+    #[test]
+    fn the_noise_of_a_microscope_keeps_its_digits() {
+        let mm = |index: u16| if index.is_multiple_of(2) { 47.49996_f32 } else { 47.50004 };
+        let maps: Vec<_> = (0..4).map(|index| Array2::from_elem((50, 60), mm(index))).collect();
+        let found = figures(&maps, None, PROJECTION, None).unwrap();
+        // Four values 40 nm from their mean: the sample's deviation is 46 nm.
+        assert!((found.temporal_noise_mm - 46e-6).abs() < 5e-6, "{found:?}");
     }
 
     #[test]

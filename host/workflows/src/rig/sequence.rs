@@ -4,7 +4,7 @@ use std::{fs, path::PathBuf};
 
 use farnear_capture::{
     camera::Image,
-    expose::{CaptureError, check_each_shot, expose_in_parts, strobe_note},
+    expose::{CaptureError, check_each_shot, expose_in_parts, strobe_note, unlit_note},
     ready::ensure_homed,
     record::{begin_folder, finish_sequence, record_of_sequence, write_image},
     sequence::{SequenceShot, ShotDefaults, image_name, read_program},
@@ -170,6 +170,7 @@ pub(super) fn take(
 ) -> Result<Vec<SequenceShot>> {
     check_each_shot(&rig.rig.client, shots)?;
     ensure_homed(&rig.rig.client, &mut |what| context.info(what))?;
+    let lit = settings.camera.light_with(optics.as_ref());
     let mut taken = Taken { folder, shots: Vec::new(), first: None };
     for run in 0..settings.runs {
         context.info(&format!("running {} shots", shots.len()));
@@ -186,8 +187,12 @@ pub(super) fn take(
         .ok_or(CaptureError::Count { reported: 0, asked: shots.len() })?;
     // A free-running camera has its own exposure time. A wrong one is wrong in every shot.
     let triggered = taken.iter().filter(|shot| shot.mode != TriggerMode::FreeRunning);
-    if let Some(note) = triggered.map(|shot| &shot.record).find_map(strobe_note) {
+    let mut records = triggered.map(|shot| &shot.record);
+    if let Some(note) = records.clone().find_map(strobe_note) {
         context.info(&note);
+    }
+    if let Some(doubt) = lit.and_then(|_| records.find_map(unlit_note)) {
+        context.progress.warn(&doubt);
     }
     finish_sequence(folder, &record)?;
     context.info(&format!("wrote {}", settings.out.display()));

@@ -27,7 +27,7 @@ use super::{
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
-    figures::rounded,
+    figures::{rounded, rounded_for},
     operators,
     optics::GivenOptics,
     request::{PathKind, Request},
@@ -107,8 +107,11 @@ struct Entry {
     true_mm: f64,
 }
 
+/// With three decimals, or as many as the distance has: those before a microscope differ by less than a micrometre.
 fn name(true_mm: f64) -> String {
-    format!("target-{true_mm:.3}")
+    let usual = format!("{true_mm:.3}");
+    let digits = if usual.parse::<f64>().ok() == Some(true_mm) { usual } else { true_mm.to_string() };
+    format!("target-{digits}")
 }
 
 impl List {
@@ -175,7 +178,7 @@ pub fn capture(settings: &TargetSeriesRequest, context: &Context<'_>) -> Result<
     Ok(TargetFigures {
         targets: list.pattern.len(),
         captured,
-        rmse_mm: error.root().map(|mm| rounded(mm, 4)),
+        rmse_mm: error.root().map(|mm| rounded_for(mm, mm, 4)),
         patterns: settings.out.join(LIST).display().to_string(),
     })
 }
@@ -262,8 +265,9 @@ fn distances(asked_mm: &[f64], optics: &Optics) -> Result<Vec<f64>> {
         return Ok(asked_mm.to_vec());
     }
     let step = (range.far_mm - range.near_mm) / (USUAL_TARGETS - 1) as f64;
-    // Rounded to 0.1 mm, which can be set on a rail.
-    Ok((0..USUAL_TARGETS).map(|i| rounded(range.near_mm + step * i as f64, 1)).collect())
+    // Rounded to 0.1 mm, which can be set on a rail, and where targets are closer together to less than their interval.
+    let decimals = (-step.log10()).ceil().max(1.0) as i32;
+    Ok((0..USUAL_TARGETS).map(|i| rounded(range.near_mm + step * i as f64, decimals)).collect())
 }
 
 /// Fails if the series was begun in another way: the correction would learn the difference.
@@ -345,6 +349,24 @@ mod tests {
         assert!(error.contains("expected at least 955 mm"), "{error}");
     }
 
+    /// Sensor distances of 50 mm: object and image are of one size, and the range is 69 um; of 52.8 mm: 14 um.
+    #[test]
+    fn the_targets_of_a_macro_lens_differ() {
+        for (f_number, pixel_um, far_mm) in [(4.0, 3.45, 50.0), (1.4, 2.4, 47.5)] {
+            let text = format!(
+                "[lens]\nfocal_length_mm = 25.0\nf_number = {f_number}\n[sensor]\npixel_um = {pixel_um}\n[focus]\n\
+                 far_mm = {far_mm}\nmax_blur_px = 2.5\n"
+            );
+            let optics = GivenOptics::parse(&text, Path::new("optics.toml")).unwrap().optics;
+            let chosen = distances(&[], &optics).unwrap();
+            assert_eq!(distances(&chosen, &optics).unwrap(), chosen, "all lie within the range");
+            let mut names: Vec<String> = chosen.into_iter().map(name).collect();
+            names.dedup();
+            assert_eq!(names.len(), USUAL_TARGETS, "{names:?}");
+        }
+        assert_eq!(name(900.0), "target-900.000");
+    }
+
     fn captured(out: &Path, true_mm: f64) {
         fs::create_dir(out.join(name(true_mm))).unwrap();
         fs::write(out.join(name(true_mm)).join("depth.npy"), "a map").unwrap();
@@ -370,7 +392,7 @@ mod tests {
         captured(out.path(), 900.0);
         let mut list = List::default();
         list.add(out.path(), 900.0).unwrap();
-        assert!(list.has(out.path(), 900.0) && list.has(out.path(), 900.0001), "the folder has three digits");
+        assert!(list.has(out.path(), 900.0) && !list.has(out.path(), 900.0001));
         fs::remove_dir_all(out.path().join("target-900.000")).unwrap();
         assert!(!list.has(out.path(), 900.0));
         list.add(out.path(), 900.0).unwrap();

@@ -1,9 +1,118 @@
 use aravis::{Auto, prelude::*};
 
 use super::GenicamCamera;
-use crate::camera::{CameraError, Range, Setting};
+use crate::camera::{CameraError, Control, Range, Setting};
+
+const AUTOMATICS: [&str; 3] = ["ExposureAuto", "GainAuto", "BlackLevelAuto"];
+const FALLING: &str = "FallingEdge";
+/// Steps of the camera's exposure: some lines, and a part of the exposure. The board's tolerance of the strobe is narrower.
+const EXPOSURE_OFF_US: f64 = 100.0;
+const EXPOSURE_OFF: f64 = 0.01;
+/// Steps of gain and black level; Aravis cuts fractions off for whole numbers.
+const LEVEL_OFF: f64 = 0.5;
 
 impl GenicamCamera {
+    /// The entry that is set; `None` for an absent feature. `Camera::string` crashes at a value without an entry.
+    pub(super) fn entry(&self, name: &str) -> Option<String> {
+        let known = self.camera.dup_available_enumerations(name).ok()?;
+        let value = self.camera.integer(name).ok()?;
+        known.contains(&value).then(|| self.camera.string(name).ok())?.map(|entry| entry.to_string())
+    }
+
+    /// Turns off what changes brightness between two images or bends the tone curve: depth compares the images and
+    /// needs values proportional to the light.
+    pub(super) fn steady(&self) -> Result<(), CameraError> {
+        let camera = &self.camera;
+        // A camera may lock them, e.g. ExposureAuto while the pulse is the exposure.
+        let usable = |name: &str| camera.is_feature_available(name).unwrap_or(false);
+        for name in AUTOMATICS {
+            if usable(name) && self.entry(name).is_some_and(|mode| mode != "Off") {
+                camera.set_string(name, "Off").map_err(self.failed())?;
+            }
+        }
+        let enabled = usable("GammaEnable").then(|| camera.boolean("GammaEnable"));
+        let bends = |gamma: f64| (gamma - 1.0).abs() > 1e-3;
+        match enabled {
+            Some(Ok(true)) => camera.set_boolean("GammaEnable", false).map_err(self.failed()),
+            None if usable("Gamma") && self.gamma().is_some_and(bends) => {
+                camera.set_float("Gamma", 1.0).map_err(self.failed())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn gamma(&self) -> Option<f64> {
+        self.camera.float("Gamma").ok()
+    }
+
+    /// Aravis sets the rising edge. An opto-coupler with an open collector inverts the pulse and needs the falling one.
+    pub(super) fn set_trigger(&self, source: &str) -> Result<(), CameraError> {
+        let camera = &self.camera;
+        let _ = camera.set_string("TriggerSelector", "FrameStart"); // some have no selector
+        let falls = self.entry("TriggerActivation").is_some_and(|edge| edge == FALLING);
+        camera.set_trigger(source).map_err(self.failed())?;
+        match falls {
+            true => camera.set_string("TriggerActivation", FALLING).map_err(self.failed()),
+            false => Ok(()),
+        }
+    }
+
+    pub(super) fn all_controls(&self) -> Result<Vec<Control>, CameraError> {
+        let failed = self.failed();
+        let camera = &self.camera;
+        let mut controls = Vec::new();
+        let mut add =
+            |name: &str, value: String, range| controls.push(Control { name: name.into(), value, range });
+        let numbers = [
+            (Setting::ExposureUs(0.0), camera.exposure_time()),
+            (Setting::Gain(0.0), camera.gain()),
+            (Setting::BlackLevel(0.0), camera.black_level()),
+        ];
+        for (setting, value) in numbers {
+            if let (Some(range), Ok(value)) = (self.range(&setting), value) {
+                add(setting.name(), value.to_string(), range);
+            }
+        }
+        let names = |names: Vec<aravis::glib::GString>| {
+            Range::Choice(names.iter().map(ToString::to_string).collect())
+        };
+        let formats = camera.dup_available_pixel_formats_as_strings().map_err(&failed)?;
+        let format = self.entry("PixelFormat").unwrap_or_else(|| "unknown".into());
+        add("pixel_format", format, names(formats));
+        let (column, row, width, height) = camera.region().map_err(&failed)?;
+        add("region", format!("{column},{row},{width},{height}"), Range::Fixed);
+        if let (Some(source), Ok(sources)) =
+            (self.entry("TriggerSource"), camera.dup_available_trigger_sources())
+        {
+            add("trigger_source", source, names(sources));
+        }
+        if let Ok((width, height)) = camera.sensor_size() {
+            add("sensor", format!("{width}x{height}"), Range::Fixed);
+        }
+        for (name, value) in [("vendor", camera.vendor_name()), ("model", camera.model_name())] {
+            if let Ok(value) = value {
+                add(name, value.to_string(), Range::Fixed);
+            }
+        }
+        for name in AUTOMATICS.into_iter().chain(["TriggerActivation"]) {
+            if let Some(entry) = self.entry(name) {
+                add(name, entry, Range::Fixed);
+            }
+        }
+        if let Ok(enabled) = camera.boolean("GammaEnable") {
+            add("GammaEnable", enabled.to_string(), Range::Fixed);
+        }
+        if let Some(gamma) = self.gamma() {
+            add("Gamma", gamma.to_string(), Range::Fixed);
+        }
+        for name in ["BinningHorizontal", "BinningVertical"] {
+            if let Ok(pixels) = camera.integer(name) {
+                add(name, pixels.to_string(), Range::Fixed);
+            }
+        }
+        Ok(controls)
+    }
+
     pub(super) fn set_number(&self, setting: &Setting, value: f64) -> Result<(), CameraError> {
         let wrong = |expected: String| CameraError::Setting {
             name: setting.name(),
@@ -25,11 +134,24 @@ impl GenicamCamera {
             }
             Setting::Gain(_) => {
                 let _ = self.camera.set_gain_auto(Auto::Off);
-                self.camera.set_gain(value)
+                match value < 0.0 {
+                    true => self.camera.set_float("Gain", value), // Aravis ignores a negative gain
+                    false => self.camera.set_gain(value),
+                }
             }
             _ => self.camera.set_black_level(value),
         };
-        set.map_err(self.failed())
+        set.map_err(self.failed())?;
+        let (taken, off) = match setting {
+            Setting::ExposureUs(_) => (self.camera.exposure_time(), EXPOSURE_OFF_US + value * EXPOSURE_OFF),
+            Setting::Gain(_) => (self.camera.gain(), LEVEL_OFF),
+            _ => (self.camera.black_level(), LEVEL_OFF),
+        };
+        let taken = taken.map_err(self.failed())?;
+        match (taken - value).abs() > off {
+            true => Err(wrong(format!("the camera made {taken} of it; expected a value that it can set"))),
+            false => Ok(()),
+        }
     }
 
     pub(super) fn range(&self, setting: &Setting) -> Option<Range> {
@@ -52,16 +174,42 @@ impl GenicamCamera {
     }
 
     pub(super) fn set_region(&self, setting: &Setting, region: [u32; 4]) -> Result<(), CameraError> {
-        let (width, height) = self.camera.sensor_size().map_err(self.failed())?;
+        let camera = &self.camera;
+        let wrong = |expected: String| CameraError::Setting {
+            name: setting.name(),
+            value: setting.value(),
+            expected,
+        };
+        let (width, height) = camera.sensor_size().map_err(self.failed())?;
         let inside = |first: u32, length: u32, side: i32| {
             length > 0 && u64::from(first) + u64::from(length) <= u64::try_from(side).unwrap_or(0)
         };
         if !inside(region[0], region[2], width) || !inside(region[1], region[3], height) {
-            let expected = format!("expected a part of the sensor's {width}x{height} px");
-            return Err(CameraError::Setting { name: setting.name(), value: setting.value(), expected });
+            return Err(wrong(format!("expected a part of the sensor's {width}x{height} px")));
         }
         let [column, row, width, height] = region.map(|side| i32::try_from(side).unwrap_or(i32::MAX));
-        self.camera.set_region(column, row, width, height).map_err(self.failed())
+        let steps = [
+            ("column", column, camera.x_offset_bounds(), camera.x_offset_increment()),
+            ("row", row, camera.y_offset_bounds(), camera.y_offset_increment()),
+            ("width", width, camera.width_bounds(), camera.width_increment()),
+            ("height", height, camera.height_bounds(), camera.height_increment()),
+        ];
+        for (name, asked, bounds, step) in steps {
+            // A camera without an offset has no bounds of it.
+            let (Ok((least, _)), Ok(step)) = (bounds, step) else { continue };
+            let beyond = i64::from(asked) - i64::from(least);
+            if beyond < 0 || (step > 1 && beyond % i64::from(step) != 0) {
+                return Err(wrong(format!("expected a {name} from {least} px in steps of {step} px")));
+            }
+        }
+        camera.set_region(column, row, width, height).map_err(self.failed())?;
+        let taken = camera.region().map_err(self.failed())?;
+        match taken == (column, row, width, height) {
+            true => Ok(()),
+            false => {
+                Err(wrong(format!("the camera made {taken:?} of it; expected a region that it can set")))
+            }
+        }
     }
 
     pub(super) fn choice(

@@ -12,6 +12,7 @@ use super::StackError;
 use crate::border::reflect;
 use crate::brightness::mean;
 use crate::median::deviation;
+use crate::optics::binned_place;
 
 /// Side of the smallest block in parts of the shorter side.
 const BLOCKS: usize = 24;
@@ -54,7 +55,8 @@ impl FocusPlane {
     /// The plane for images binned by `bin` x `bin`.
     pub fn binned(&self, bin: usize) -> Self {
         let b = bin as f64;
-        let at_origin = self.at((b - 1.0) / 2.0, (b - 1.0) / 2.0);
+        let first = binned_place(0.0, b.recip());
+        let at_origin = self.at(first, first);
         Self { x_per_px: self.x_per_px * b, y_per_px: self.y_per_px * b, at_origin, ..*self }
     }
 

@@ -5,7 +5,6 @@ use farnear_workflows::{activity::evaluate::EvaluateRequest, request::Request};
 use crate::{report, terminal};
 
 // Not a doc comment: the help text is that of the request.
-#[allow(missing_docs)]
 #[derive(Args)]
 pub struct Evaluate {
     #[command(flatten)]

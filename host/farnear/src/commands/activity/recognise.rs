@@ -5,7 +5,6 @@ use farnear_workflows::activity::recognise::RecogniseRequest;
 use crate::{report, terminal};
 
 // No doc comment: the help text is that of the request.
-#[allow(missing_docs)]
 #[derive(Args)]
 pub struct Recognise {
     #[command(flatten)]

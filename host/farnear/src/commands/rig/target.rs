@@ -64,7 +64,7 @@ struct SceneryArguments {
 }
 
 /// Checks that the text parses as a `T`; the simulator parses it again.
-fn checked<T: std::str::FromStr>(text: &str) -> Result<String, T::Err> {
+pub fn checked<T: std::str::FromStr>(text: &str) -> Result<String, T::Err> {
     text.parse::<T>().map(|_| text.to_owned())
 }
 

@@ -2,10 +2,17 @@
 
 use std::{fs, path::Path};
 
+use assert_cmd::Command;
 use image::GrayImage;
 
 use super::PEOPLE;
 use crate::common::{Folder, fails, farnear, figures, number, succeeds};
+
+fn recognise(masks: &[&str]) -> Command {
+    let mut command = farnear(&["activity", "recognise", "--as", "masks", "--model", "everyday"]);
+    command.args(masks);
+    command
+}
 
 #[test]
 fn models_that_come_with_the_program_need_nothing_else() {
@@ -36,19 +43,10 @@ fn models_that_come_with_the_program_need_nothing_else() {
         assert!(among["probabilities"][1]["probability"].as_f64() > Some(0.9), "{among}");
     }
     let masks = people.masks("p00-walk", 1);
-    let both = [
-        "activity",
-        "recognise",
-        &masks,
-        &people.masks("p00-walk", 2),
-        "--as",
-        "masks",
-        "--model",
-        "everyday",
-    ];
-    figures(farnear(&both).arg("--json"));
+    let both: [&str; 2] = [&masks, &people.masks("p00-walk", 2)];
+    figures(recognise(&both).arg("--json"));
     let unknown = ["activity sing: the model knows", "jumping jack"];
-    fails(farnear(&both).args(["--among", "walk,sing"]), 2, &unknown);
+    fails(recognise(&both).args(["--among", "walk,sing"]), 2, &unknown);
     fails(&mut farnear(&["activity", "recognise", &masks, "--model", "everyyday"]), 1, &["everyyday"]);
 }
 
@@ -104,16 +102,7 @@ fn an_unknown_answer_has_a_reason() {
     for frame in 0..3 {
         GrayImage::new(60, 60).save(Path::new(&masks).join(format!("{frame}.png"))).expect("saved");
     }
-    let found = figures(&mut farnear(&[
-        "activity",
-        "recognise",
-        &masks,
-        "--as",
-        "masks",
-        "--model",
-        "everyday",
-        "--json",
-    ]));
+    let found = figures(recognise(&[&masks]).arg("--json"));
     assert!(found["activity"].is_null());
     assert_eq!(found["reason"], "no person in any of the 3 frames");
 }

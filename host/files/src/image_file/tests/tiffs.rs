@@ -88,6 +88,14 @@ fn lzw_data_without_an_end_have_one_remedy() {
 }
 
 #[test]
+fn lzw_data_whose_pixels_are_whole_need_no_end() {
+    // Clear, 10, 20, 30 and 40 in 9 bits each.
+    let codes = vec![0x80, 0x02, 0x82, 0x81, 0xe1, 0x40];
+    let bytes = tiff(CLASSIC, &[Page::grey(4, 1, 8, codes).with(259, &[5])]);
+    assert_eq!(read(&bytes), ndarray::array![[10.0, 20.0, 30.0, 40.0]]);
+}
+
+#[test]
 fn bytes_of_a_text_that_are_not_utf_8_are_latin_1() {
     let unit = |letter: &[u8]| {
         let page = Page { texts: vec![(270, "unit=~~m \u{b5}".into())], ..Page::grey(1, 1, 8, vec![7]) };

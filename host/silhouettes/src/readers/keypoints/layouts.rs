@@ -32,189 +32,46 @@ pub const BODY_25B: Layout = Layout { name: "OpenPose BODY_25B", count: 25, poin
 /// Estimators of 3-D poses mostly use this order.
 pub const HUMAN36M: Layout = Layout { name: "Human3.6M", count: 17, points: &HUMAN36M_17 };
 
-const HUMAN36M_17: [&str; 17] = [
-    "hip centre",
-    "rh",
-    "rk",
-    "ra",
-    "lh",
-    "lk",
-    "la",
-    "",
-    "neck",
-    "nose",
-    "head top",
-    "ls",
-    "le",
-    "lw",
-    "rs",
-    "re",
-    "rw",
-];
-const MPI_15: [&str; 15] =
-    ["head top", "neck", "rs", "re", "rw", "ls", "le", "lw", "rh", "rk", "ra", "lh", "lk", "la", ""];
-const MPII_16: [&str; 16] = [
-    "ra",
-    "rk",
-    "rh",
-    "lh",
-    "lk",
-    "la",
-    "hip centre",
-    "",
-    "neck",
-    "head top",
-    "rw",
-    "re",
-    "rs",
-    "ls",
-    "le",
-    "lw",
-];
-const COCO_17: [&str; 17] = [
-    "nose",
-    "left eye",
-    "right eye",
-    "left ear",
-    "right ear",
-    "ls",
-    "rs",
-    "le",
-    "re",
-    "lw",
-    "rw",
-    "lh",
-    "rh",
-    "lk",
-    "rk",
-    "la",
-    "ra",
-];
-const OPENPOSE_18: [&str; 18] = [
-    "nose",
-    "neck",
-    "rs",
-    "re",
-    "rw",
-    "ls",
-    "le",
-    "lw",
-    "rh",
-    "rk",
-    "ra",
-    "lh",
-    "lk",
-    "la",
-    "right eye",
-    "left eye",
-    "right ear",
-    "left ear",
-];
+const LEFT_ARM: [&str; 3] = ["ls", "le", "lw"];
+const RIGHT_ARM: [&str; 3] = ["rs", "re", "rw"];
+const ARMS: [&str; 6] = joined(&[&RIGHT_ARM, &LEFT_ARM]);
+const LEGS: [&str; 6] = ["rh", "rk", "ra", "lh", "lk", "la"];
+const IN_PAIRS: [&str; 12] = ["ls", "rs", "le", "re", "lw", "rw", "lh", "rh", "lk", "rk", "la", "ra"];
+const EYES_AND_EARS: [&str; 4] = ["right eye", "left eye", "right ear", "left ear"];
 const FEET: [&str; 6] =
     ["left big toe", "left small toe", "left heel", "right big toe", "right small toe", "right heel"];
+const FEET_IN_PAIRS: [&str; 6] =
+    ["left big toe", "right big toe", "left small toe", "right small toe", "left heel", "right heel"];
+
+const HUMAN36M_17: [&str; 17] =
+    joined(&[&["hip centre"], &LEGS, &["", "neck", "nose", "head top"], &LEFT_ARM, &RIGHT_ARM]);
+const MPI_15: [&str; 15] = joined(&[&["head top", "neck"], &ARMS, &LEGS, &[""]]);
+const MPII_16: [&str; 16] = joined(&[
+    &["ra", "rk", "rh", "lh", "lk", "la"],
+    &["hip centre", "", "neck", "head top"],
+    &["rw", "re", "rs", "ls", "le", "lw"],
+]);
+const COCO_17: [&str; 17] = joined(&[&["nose", "left eye", "right eye", "left ear", "right ear"], &IN_PAIRS]);
+const OPENPOSE_18: [&str; 18] = joined(&[&["nose", "neck"], &ARMS, &LEGS, &EYES_AND_EARS]);
 const COCO_23: [&str; 23] = joined(&[&COCO_17, &FEET]);
-const BODY_25_WITHOUT_FEET: [&str; 19] = [
-    "nose",
-    "neck",
-    "rs",
-    "re",
-    "rw",
-    "ls",
-    "le",
-    "lw",
-    "hip centre",
-    "rh",
-    "rk",
-    "ra",
-    "lh",
-    "lk",
-    "la",
-    "right eye",
-    "left eye",
-    "right ear",
-    "left ear",
-];
-const BODY_25: [&str; 25] = joined(&[&BODY_25_WITHOUT_FEET, &FEET]);
+const BODY_25: [&str; 25] =
+    joined(&[&["nose", "neck"], &ARMS, &["hip centre"], &LEGS, &EYES_AND_EARS, &FEET]);
 const BODY_25B_POINTS: [&str; 25] = joined(&[&COCO_17, &["neck", "head top"], &FEET]);
-const HALPE_TRUNK_AND_FEET: [&str; 9] = [
-    "head top",
-    "neck",
-    "hip centre",
-    "left big toe",
-    "right big toe",
-    "left small toe",
-    "right small toe",
-    "left heel",
-    "right heel",
-];
-const HALPE_26: [&str; 26] = joined(&[&COCO_17, &HALPE_TRUNK_AND_FEET]);
-const MEDIAPIPE_33: [&str; 33] = [
-    "nose",
-    "",
-    "left eye",
-    "",
-    "",
-    "right eye",
-    "",
-    "left ear",
-    "right ear",
-    "",
-    "",
-    "ls",
-    "rs",
-    "le",
-    "re",
-    "lw",
-    "rw",
-    "",
-    "",
-    "left hand",
-    "right hand",
-    "",
-    "",
-    "lh",
-    "rh",
-    "lk",
-    "rk",
-    "la",
-    "ra",
-    "left heel",
-    "right heel",
-    "left big toe",
-    "right big toe",
-];
+const HALPE_26: [&str; 26] = joined(&[&COCO_17, &["head top", "neck", "hip centre"], &FEET_IN_PAIRS]);
+const MEDIAPIPE_33: [&str; 33] = joined(&[
+    &["nose", "", "left eye", "", "", "right eye", "", "left ear", "right ear", "", ""],
+    &["ls", "rs", "le", "re", "lw", "rw", "", "", "left hand", "right hand", "", ""],
+    &["lh", "rh", "lk", "rk", "la", "ra", "left heel", "right heel", "left big toe", "right big toe"],
+]);
 
 /// Names of the template `keypoints`, in the readers' order.
-pub const NAMES: [&str; 28] = [
-    "nose",
-    "left eye",
-    "right eye",
-    "left ear",
-    "right ear",
-    "head top",
-    "neck",
-    "hip centre",
-    "left shoulder",
-    "right shoulder",
-    "left elbow",
-    "right elbow",
-    "left wrist",
-    "right wrist",
-    "left hand",
-    "right hand",
-    "left hip",
-    "right hip",
-    "left knee",
-    "right knee",
-    "left ankle",
-    "right ankle",
-    "left heel",
-    "right heel",
-    "left big toe",
-    "right big toe",
-    "left small toe",
-    "right small toe",
-];
+pub const NAMES: [&str; 28] = joined(&[
+    &["nose", "left eye", "right eye", "left ear", "right ear", "head top", "neck", "hip centre"],
+    &["left shoulder", "right shoulder", "left elbow", "right elbow", "left wrist", "right wrist"],
+    &["left hand", "right hand", "left hip", "right hip", "left knee", "right knee"],
+    &["left ankle", "right ankle", "left heel", "right heel"],
+    &["left big toe", "right big toe", "left small toe", "right small toe"],
+]);
 
 const fn joined<const COUNT: usize>(parts: &[&[&'static str]]) -> [&'static str; COUNT] {
     let mut points = [""; COUNT];

@@ -9,7 +9,7 @@ use farnear_capture::{
 };
 use farnear_protocol::{
     Micros, Nanometres, Settle,
-    message::{Alarm, Axis, Calibration, Limits, Routine, SettingKey, ShotRecord, StepperKeys},
+    message::{Alarm, Axis, Calibration, Limits, Routine, Setting, SettingKey, ShotRecord, StepperKeys},
 };
 
 use super::{Checkup, EquippedRig, Found, failed, passed, passed_over};
@@ -18,9 +18,10 @@ use super::{Checkup, EquippedRig, Found, failed, passed, passed_over};
 const SLOW_NM_PER_S: i32 = 500_000;
 /// Largest difference between two homings.
 const REPEATS_UM: f64 = 1.5;
-/// Exposures of the strobe check, and tolerance of the strobe's length.
+/// Exposures of the strobe check, and tolerance of the strobe's length, as of the board: time, and divisor of the exposure.
 const EXPOSURES: u16 = 5;
 const STROBE_US: u64 = 100;
+const CLOCKS_APART: u64 = 5_000;
 
 fn range(axis: Axis, limits: &Limits) -> (i32, i32) {
     let (min, max) = limits.of(axis);
@@ -135,6 +136,9 @@ pub(super) fn piezo(checkup: &mut Checkup<'_>) -> Found {
     if !checkup.client().hello().capabilities.sensor_fine {
         return passed_over("the rig has no piezo");
     }
+    if let Some(reason) = unswept(&checkup.client().setting(SettingKey::FineMaxNm)?) {
+        return passed_over(reason);
+    }
     match checkup.client().calibrate(Routine::Piezo)? {
         Calibration::Piezo { gain_pm_per_code, hysteresis_ppm, creep_ppm_per_decade } => passed(format!(
             "{gain_pm_per_code} pm a code, hysteresis {:.1} %, creep {:.2} % a decade",
@@ -143,6 +147,18 @@ pub(super) fn piezo(checkup: &mut Checkup<'_>) -> Found {
         )),
         other => failed(format!("the board measured something else: {other:?}")),
     }
+}
+
+/// Why the whole stroke is not swept: a limit excludes its upper end.
+fn unswept(fine_max: &Setting) -> Option<String> {
+    let Setting { key, value, default, .. } = fine_max;
+    (value < default).then(|| {
+        format!(
+            "{} is {value}, and the sweep drives the whole stroke: set it to {default} for `farnear rig calibrate piezo`, if the piezo \
+             has that stroke",
+            key.name()
+        )
+    })
 }
 
 pub(super) fn toggle(checkup: &mut Checkup<'_>) -> Found {
@@ -186,11 +202,29 @@ pub(super) fn strobe(checkup: &mut Checkup<'_>) -> Found {
     let latency = |record: &ShotRecord| record.strobe_start.0.saturating_sub(record.trigger.0);
     let worst = records.iter().map(off).max().unwrap_or(0);
     let latest = records.iter().map(latency).max().unwrap_or(0);
-    if worst > STROBE_US {
+    if worst > STROBE_US + u64::from(exposure.0) / CLOCKS_APART {
         return failed(format!("a strobe was {worst} us longer or shorter than the exposure asked for"));
     }
     passed(format!(
         "{} exposures with their images; strobe at most {latest} us after the trigger, {worst} us off in length",
         records.len()
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_piezo_with_a_narrower_limit_is_not_swept() {
+        let default = 195_000;
+        let setting =
+            |value| Setting { key: SettingKey::FineMaxNm, value, default, min: 5_000, max: default };
+        assert_eq!(unswept(&setting(default)), None);
+        let reason = unswept(&setting(170_000)).unwrap();
+        assert!(
+            reason.starts_with("fine_max_nm is 170000") && reason.contains("set it to 195000"),
+            "{reason}"
+        );
+    }
 }
