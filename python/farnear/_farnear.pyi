@@ -480,7 +480,7 @@ def points_mm(
     Parameters
     ----------
     depth_mm : array (height, width)
-        Depth map, mm; NaN where there is none, or any depth within the focal length, such as 0. With optics of
+        Depth map, mm; NaN, or a depth within the focal length such as 0, where a pixel has none. With optics of
         `calibrate_stack`, whose depths may be relative, NaN only.
     optics : Optics
         The optics of the map; those of `calibrate_stack` need its `object_pixel_um`.

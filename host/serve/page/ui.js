@@ -130,7 +130,7 @@ export function popUp(label, children, onescape) {
   const typing = document.activeElement?.matches("input, textarea, select");
   document.body.append(dialog);
   dialog.show();
-  // What is typed at this moment is meant for another field.
+  // Keys typed at this moment are meant for another field.
   if (typing) dialog.focus();
   return () => {
     removeEventListener("keydown", escape);

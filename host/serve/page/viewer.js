@@ -208,7 +208,7 @@ export class Viewer {
     canvas.addEventListener("pointerdown", (event) => this.down(event));
     canvas.addEventListener("pointermove", (event) => this.moved(event));
     for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, (event) => this.up(event));
-    // A finger that is lifted leaves, too: what it has touched can be read then.
+    // A finger that is lifted leaves, too: the value under it must remain readable.
     canvas.addEventListener("pointerleave", (event) => event.pointerType === "mouse" && this.onprobe?.(null));
     canvas.addEventListener("keydown", (event) => {
       const step = 40;

@@ -153,7 +153,7 @@ fn discovers_describes_configures_and_watches_the_camera() {
             "{error}"
         );
     }
-    // The camera keeps what it made of 3.7, and multiplies its pixels by it.
+    // The camera has rounded 3.7 to a gain of 3, which multiplies its pixels.
     camera.set(&Setting::Gain(0.0)).unwrap();
     camera.watch().unwrap();
     let (first, second) = (next(&mut camera), next(&mut camera));
