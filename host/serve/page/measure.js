@@ -43,7 +43,7 @@ export function make() {
       return map.data[row * map.width + column];
     };
     const depth = number(value("depth"), 2, "mm");
-    // A screen reader is told by the keys alone: a pointer would flood it.
+    // Only keys announce values to a screen reader: a pointer passes too many.
     probe.replaceChildren(h("output", { class: "big", "aria-live": "off" }, depth),
       rows([["pixel", at ? `${at[0]}, ${at[1]}` : "–"], ["± deviation", number(value("deviation"), 2, "mm")], ["confidence", number(value("confidence"), 2)], maps.reason && ["no depth because", value("reason") ? REASONS[value("reason")] : "–"]]));
     return Number.isFinite(value("depth")) ? depth : `no depth${value("reason") ? `, ${REASONS[value("reason")]}` : ""}`;

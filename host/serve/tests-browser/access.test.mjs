@@ -2,26 +2,15 @@
 import assert from "node:assert/strict";
 import { cpSync } from "node:fs";
 import { join } from "node:path";
-import { after, afterEach, before, test } from "node:test";
-import { browser as launch, open, serve } from "./server.mjs";
+import { test } from "node:test";
+import { browser, oneServer, open, server } from "./server.mjs";
 
-let browser, server;
-before(async () => {
-  browser = await launch();
-  server = await serve();
+oneServer(async () => {
   const page = await open(browser, server.address);
   await page.getByRole("button", { name: "Capture pair" }).click();
   await page.locator("button[data-layer=surface]:enabled").waitFor();
   assert.equal(await page.title(), "Depth – farnear", "the title names the view");
   await page.context().close();
-});
-afterEach(async () => {
-  for (const context of browser.contexts()) await context.close();
-  await server.released();
-});
-after(async () => {
-  await browser?.close();
-  assert.equal(await server?.close(), 0);
 });
 
 /** The page with the depth of the first pair. */
@@ -180,7 +169,7 @@ test("the focus stays in the list after a capture is renamed or deleted, and in 
   assert.equal(await focused(), "view");
 });
 
-test("a screen reader is told when a job begins and ends, and of nothing that only counts", async () => {
+test("a screen reader announces the begin and the end of a job, and no counters", async () => {
   const page = await open(browser, server.address);
   const live = page.getByRole("button", { name: "Live image" });
   await page.locator("#view-live .group button:enabled").first().waitFor();
@@ -264,7 +253,7 @@ test("colours of the reasons differ also for people with a colour-vision deficie
   }
 });
 
-test("dates are the same in every language, and the sun's time is told in UTC", async () => {
+test("dates have one form in every language, and the sun's time is also shown in UTC", async () => {
   const page = await open(browser, `${server.address}#captures`, { locale: "ar-EG", timezoneId: "Asia/Tokyo" });
   await page.locator(".capture-words p", { hasText: /\d{4}-\d\d-\d\d \d\d:\d\d:\d\d$/ }).first().waitFor();
   await page.locator("#tab-guides").click();

@@ -6,32 +6,17 @@ import { createHash } from "node:crypto";
 import { mkdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { join } from "node:path";
-import { after, afterEach, before, test } from "node:test";
+import { test } from "node:test";
 import { Validator } from "@seriousme/openapi-schema-validator";
-import { browser as launch, knows, open, reloaded, serve, simulator } from "./server.mjs";
+import { browser, knows, oneServer, open, reloaded, serve, server, simulator } from "./server.mjs";
 
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const VIEWS = ["live", "depth", "optics", "captures", "quality", "guides", "log"];
 const GUIDES = ["power", "psf", "lens", "series", "shadow", "activity"];
 const SIZES = [[1440, 900], [820, 1180], [390, 844]];
-let server;
-let browser;
 
-before(async () => {
-  if (process.env.SCREENSHOTS) mkdirSync(process.env.SCREENSHOTS, { recursive: true });
-  server = await serve();
-  browser = await launch();
-});
-after(async () => {
-  await browser?.close();
-  assert.equal(await server?.close(), 0, "Ctrl-C ends it well");
-});
-
-// A test that failed leaves no page open. Control is reserved for the last page: the next one gets it after that.
-afterEach(async () => {
-  for (const context of browser.contexts()) await context.close();
-  await server.released();
-});
+if (process.env.SCREENSHOTS) mkdirSync(process.env.SCREENSHOTS, { recursive: true });
+oneServer();
 
 const state = () => server.ask("/api/state");
 

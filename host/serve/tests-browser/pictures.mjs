@@ -3,7 +3,7 @@
 import { createHash } from "node:crypto";
 import { readFileSync, readdirSync, statSync, writeFileSync } from "node:fs";
 import { join, relative } from "node:path";
-import { browser as launch, open, serve } from "./server.mjs";
+import { launch, open, serve } from "./server.mjs";
 
 const PAGE = join(import.meta.dirname, "../page");
 const OUT = process.env.SCREENSHOTS ?? join(import.meta.dirname, "../../../docs/images");

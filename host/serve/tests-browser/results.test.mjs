@@ -2,22 +2,10 @@
 import assert from "node:assert/strict";
 import { cpSync, readdirSync, rmSync } from "node:fs";
 import { join } from "node:path";
-import { after, afterEach, before, test } from "node:test";
-import { browser as launch, open, reloaded, serve } from "./server.mjs";
+import { test } from "node:test";
+import { browser, oneServer, open, reloaded, serve, server } from "./server.mjs";
 
-let browser, server;
-before(async () => {
-  browser = await launch();
-  server = await serve();
-});
-afterEach(async () => {
-  for (const context of browser.contexts()) await context.close();
-  await server.released();
-});
-after(async () => {
-  await browser?.close();
-  assert.equal(await server?.close(), 0);
-});
+oneServer();
 
 test("flat series, correction, point spread function and quality are shown after a reload", async () => {
   const page = await open(browser, `${server.address}#guides/series`);

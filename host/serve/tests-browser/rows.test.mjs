@@ -2,22 +2,10 @@
 import assert from "node:assert/strict";
 import { cpSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { after, afterEach, before, test } from "node:test";
-import { browser as launch, open, serve } from "./server.mjs";
+import { test } from "node:test";
+import { browser, oneServer, open, serve, server } from "./server.mjs";
 
-let browser, server;
-before(async () => {
-  browser = await launch();
-  server = await serve();
-});
-afterEach(async () => {
-  for (const context of browser.contexts()) await context.close();
-  await server.released();
-});
-after(async () => {
-  await browser?.close();
-  assert.equal(await server?.close(), 0);
-});
+oneServer();
 
 /** Posts as this page would, with its secret. */
 const post = (page, path, body = {}) => page.evaluate(async ([path, body]) => {

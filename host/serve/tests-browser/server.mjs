@@ -4,6 +4,7 @@ import { spawn, spawnSync } from "node:child_process";
 import { existsSync, mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { dirname, join } from "node:path";
+import { after, afterEach, before } from "node:test";
 import { chromium } from "playwright-core";
 
 const FARNEAR = process.env.FARNEAR ?? join(import.meta.dirname, "../../../target/debug/farnear");
@@ -53,9 +54,30 @@ export async function simulator(options) {
 const FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader-webgl", "--enable-unsafe-swiftshader"];
 const found = () => BROWSERS.find((path) => path && existsSync(path));
 
+/** The browser and the server of `oneServer`. */
+export let browser, server;
+
+/** One browser, and one server of the emulated rig, for all tests of a file, which begin after `prepare`. */
+export function oneServer(prepare = async () => {}) {
+  before(async () => {
+    server = await serve();
+    browser = await launch();
+    await prepare();
+  });
+  after(async () => {
+    await browser?.close();
+    assert.equal(await server?.close(), 0, "Ctrl-C ends it well");
+  });
+  // A test that failed leaves no page open. Control is reserved for the last page: the next one gets it after that.
+  afterEach(async () => {
+    for (const context of browser.contexts()) await context.close();
+    await server.released();
+  });
+}
+
 /** A browser without a graphics card, so that it runs anywhere, as one is that finds none: it puts pages together by the processor, and
  * SwiftShader is for WebGL alone. (With SwiftShader for everything, pages come a few times a second.) */
-export function browser() {
+export function launch() {
   return chromium.launch({ executablePath: found(), args: FLAGS });
 }
 
