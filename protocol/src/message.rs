@@ -41,7 +41,9 @@ pub use self::{
     },
     memory::{Counters, RecordName, Setting, SettingKey, StepperKeys},
     request::Request,
-    shot::{DropReason, ProgramState, ProgramStatus, Shot, ShotFault, ShotRecord, TriggerMode},
+    shot::{
+        DropReason, ProgramState, ProgramStatus, Shot, ShotFault, ShotRecord, TriggerMode, strobe_tolerance,
+    },
 };
 
 /// Key of all message tables: equal keys mean equal bytes for every message.

@@ -4,16 +4,11 @@
 //! end comes from the strobe, before that from pulse length and longest latency. A strobe shorter than the pulse has
 //! lost its beginning (loose contact): missing. Untriggered: the first to begin after listening started counts.
 
-use farnear_protocol::message::ShotLight;
+use farnear_protocol::message::{ShotLight, strobe_tolerance};
 use farnear_protocol::{BoardMicros, Micros};
 
 use crate::io::{ExposureEdges, Inputs, Trigger};
 use crate::settings::CameraSettings;
-
-/// Permitted shortening of the strobe: cameras count exposure in lines of some 10 us.
-const SHORTER_US: u32 = 100;
-/// Divisor of the exposure for the part that is permitted, too: two crystals differ by 50 ppm each, plus a margin.
-const CLOCKS_APART: u32 = 5_000;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Awaited {
@@ -68,8 +63,7 @@ impl Camera {
         let end = at.0 + u64::from(exposure.0) + u64::from(self.settings.strobe_deadline.0);
         self.ready_at = BoardMicros(end + u64::from(self.settings.readout.0));
         self.order = Some(Trigger { at, length: exposure, flash });
-        let shorter_us = SHORTER_US + exposure.0 / CLOCKS_APART;
-        let shortest_us = u64::from(exposure.0.saturating_sub(shorter_us));
+        let shortest_us = u64::from(exposure.0.saturating_sub(strobe_tolerance(exposure).0));
         self.expect(BoardMicros(end), Awaited::Triggered, shortest_us)
     }
 
@@ -147,41 +141,34 @@ mod tests {
     use super::*;
     use crate::settings::Settings;
 
+    /// Whether an exposure is good whose signal begins and ends by so much too late and too early.
+    fn answer(exposure: Micros, late_us: u64, early_us: u64) -> Option<bool> {
+        let mut camera = Camera::new(Settings::DEFAULT.camera);
+        let number = camera.trigger(exposure, None, BoardMicros(1_000));
+        let end = BoardMicros(1_020 + u64::from(exposure.0) - early_us);
+        let edges = ExposureEdges {
+            trigger: BoardMicros(1_000),
+            strobe_start: BoardMicros(1_020 + late_us),
+            strobe_end: end,
+            flash: None,
+        };
+        let now = BoardMicros(end.0 + 100);
+        camera.sense(&Inputs { exposure: Some(edges), ..Inputs::idle(now) });
+        assert!(!camera.is_ready(now), "it reads out");
+        camera.result(number).map(|edges| edges.is_ok())
+    }
+
     #[test]
     fn a_strobe_without_a_start_is_ignored_and_the_read_out_still_awaited() {
         // Found by the campaign: a wire reconnected during an exposure, which was reported 0.86 ms late.
-        let answer = |lost_us: u64| {
-            let mut camera = Camera::new(Settings::DEFAULT.camera);
-            let number = camera.trigger(Micros(5_884), None, BoardMicros(1_000));
-            let edges = ExposureEdges {
-                trigger: BoardMicros(1_000),
-                strobe_start: BoardMicros(1_020 + lost_us),
-                strobe_end: BoardMicros(6_904),
-                flash: None,
-            };
-            camera.sense(&Inputs { exposure: Some(edges), ..Inputs::idle(BoardMicros(7_000)) });
-            assert!(!camera.is_ready(BoardMicros(7_000)), "it reads out");
-            camera.result(number).map(|edges| edges.is_ok())
-        };
-        assert_eq!([0, 90, 859].map(answer), [Some(true), Some(true), Some(false)]);
+        let of_late = |late_us| answer(Micros(5_884), late_us, 0);
+        assert_eq!([0, 90, 859].map(of_late), [Some(true), Some(true), Some(false)]);
     }
 
     #[test]
     fn a_long_exposure_may_differ_by_the_clocks_of_camera_and_board() {
-        let answer = |shorter_us: u64| {
-            let mut camera = Camera::new(Settings::DEFAULT.camera);
-            let number = camera.trigger(Micros(1_000_000), None, BoardMicros(1_000));
-            let edges = ExposureEdges {
-                trigger: BoardMicros(1_000),
-                strobe_start: BoardMicros(1_020),
-                strobe_end: BoardMicros(1_001_020 - shorter_us),
-                flash: None,
-            };
-            let now = BoardMicros(1_001_100);
-            camera.sense(&Inputs { exposure: Some(edges), ..Inputs::idle(now) });
-            camera.result(number).map(|edges| edges.is_ok())
-        };
+        let of_early = |early_us| answer(Micros(1_000_000), 0, early_us);
         // 200 ppm and 100 us.
-        assert_eq!([0, 150, 300, 301].map(answer), [Some(true), Some(true), Some(true), Some(false)]);
+        assert_eq!([0, 150, 300, 301].map(of_early), [Some(true), Some(true), Some(true), Some(false)]);
     }
 }

@@ -34,7 +34,7 @@ pub(crate) use rows::{
     vertical_sums_of_seven,
 };
 pub(crate) use windows::{
-    Believed, CubicSums, Deviation, Found, OfNoise, Residual, TOGETHER, add_products, add_row, believe_row,
+    Believed, CubicSums, Deviation, Found, MAX_LANES, OfNoise, Residual, add_products, add_row, believe_row,
     deviation_row, dimensionless_row, evidence_row, move_products, residual_row, roots, row_sums, sum_rows,
 };
 

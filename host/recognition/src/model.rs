@@ -14,6 +14,7 @@ use crate::embedding::{EmbeddingError, descriptor::Scaling, squared_distance};
 use ndarray::{Array1, Array2, ArrayView1};
 use serde::{Deserialize, Serialize};
 
+/// How a [`Recogniser`] is trained.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RecogniserSettings {
     pub scaling: Scaling,
@@ -36,6 +37,7 @@ impl Default for RecogniserSettings {
     }
 }
 
+/// Recognises the activity of a clip from the pattern of its frames in a learned space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recogniser {
     pub settings: RecogniserSettings,

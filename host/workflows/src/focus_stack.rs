@@ -281,8 +281,8 @@ struct Record<'a> {
     #[serde(skip_serializing_if = "is_even")]
     brightness: &'a [f64],
     /// Largest change over the stack, as a logarithm, of the vignetting that images are divided by.
-    #[serde(skip_serializing_if = "is_zero")]
-    vignetting: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    vignetting: Option<f64>,
     left_out: &'a [String],
     positions: &'a [f64],
     distortion: Option<DistortionSection>,
@@ -290,10 +290,6 @@ struct Record<'a> {
     object_pixel_um: Option<f64>,
     optics: Option<Optics>,
     input: Vec<HashedFile>,
-}
-
-fn is_zero(value: &f64) -> bool {
-    *value == 0.0
 }
 
 fn is_even(gains: &[f64]) -> bool {
@@ -336,10 +332,10 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
     let unseen = images.prepare(listed.distortion(), &frames.warps)?;
     // Of aligned images, because a lens that breathes in uneven light looks alike.
     let vignetting = images.even_vignetting(&listed.even_positions())?;
-    if vignetting > 0.0 {
+    if let Some(change) = vignetting {
         context.info(&format!(
             "evening out vignetting that changes by up to {:.0} % over the stack",
-            100.0 * vignetting
+            100.0 * change
         ));
     }
     context.info(&format!("measuring {} images by {}", images.count(), request.measure));
@@ -369,7 +365,7 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
         white_level: request.white_level,
         images: &names,
         brightness: &frames.gains,
-        vignetting: rounded(vignetting, 4),
+        vignetting: vignetting.map(|change| rounded(change, 4)),
         left_out: &figures.left_out,
         positions: &listed.positions,
         distortion: listed.distortion().map(DistortionSection::from),

@@ -65,6 +65,12 @@ pub struct ShotRecord {
     pub exposure: Micros,
 }
 
+/// How much shorter than the exposure the camera's signal may be: cameras count in lines of some 10 us, and two crystals
+/// differ by 50 ppm each, plus a margin.
+pub const fn strobe_tolerance(exposure: Micros) -> Micros {
+    Micros(100 + exposure.0 / 5_000)
+}
+
 impl ShotRecord {
     /// Position of an axis at the trigger, by encoder or gauge.
     pub const fn measured(&self, axis: Axis) -> Nanometres {

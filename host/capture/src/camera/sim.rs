@@ -14,7 +14,7 @@ use std::{
 
 use farnear_protocol::{
     camera::{Control, FRAME_HEADER, FREE_RUNNING, FrameHeader, IN_USE},
-    message::{ShotRecord, TriggerMode},
+    message::{ShotRecord, TriggerMode, strobe_tolerance},
     units::Micros,
 };
 use ndarray::Array2;
@@ -28,8 +28,8 @@ const FAREWELL: Duration = Duration::from_millis(500);
 const QUEUE: usize = 8;
 /// Minimum gap of free-running exposures: read-out and a margin.
 const BETWEEN_EXPOSURES_US: u32 = 15_000;
-/// Tolerance between strobe and reported exposure start: the board accepts one that has lost 300 us of a second.
-const SAME_MOMENT_US: u64 = 300;
+/// Tolerance between strobe and reported exposure start, beyond what the board lets a strobe lose.
+const SAME_MOMENT_US: u64 = 50;
 const WATCH_EXPOSURE: Micros = Micros(5_000);
 const STREAM_ENDED: &str = "the stream has ended";
 
@@ -219,7 +219,8 @@ impl Camera for SimCamera {
                     Err(()) => return Err(self.ended()),
                 };
             let FrameHeader { shot_id, exposure, .. } = frame.header;
-            let later = if exposure.0.abs_diff(shot.strobe_start.0) <= SAME_MOMENT_US {
+            let apart_us = exposure.0.abs_diff(shot.strobe_start.0);
+            let later = if apart_us <= SAME_MOMENT_US + u64::from(strobe_tolerance(shot.exposure).0) {
                 // The simulator does not know the number of an exposure that failed without a trigger.
                 0
             } else if shot_id == FREE_RUNNING {

@@ -37,7 +37,7 @@ impl Agreement {
             compared: [plane(), plane(), plane()],
             sums: Plane::new(6, wide),
             // Decided rows are extended to whole vectors.
-            work: vec![0.0; 2 * (wide + simd::TOGETHER)],
+            work: vec![0.0; 2 * (wide + simd::MAX_LANES)],
         }
     }
 
@@ -79,7 +79,7 @@ impl Agreement {
     /// Alpha and its variance of the row `half` before the last one, without the outer `half` columns.
     pub fn decide(&mut self, backend: Backend, row: usize, wide: usize, to: [&mut [f32]; 2]) {
         let at = (row - self.half) % self.ring;
-        let width = (wide - 2 * self.half).next_multiple_of(simd::TOGETHER).min(to[0].len());
+        let width = (wide - 2 * self.half).next_multiple_of(simd::MAX_LANES).min(to[0].len());
         let wide = width + 2 * self.half;
         let stride = self.sums.stride();
         let (of_rows, of_windows) = self.sums.all_mut().split_at_mut(3 * stride);

@@ -42,8 +42,8 @@ fn columns(width: usize) -> usize {
 
 /// Columns of windows, of their products and of the filters' input. Surplus columns on the right make whole vectors.
 fn widths(columns: usize, outer: usize, radius: usize, reach: usize) -> [usize; 3] {
-    let wide = (columns + 2 * outer).next_multiple_of(simd::TOGETHER);
-    let products = (wide + 2 * radius).next_multiple_of(simd::TOGETHER);
+    let wide = (columns + 2 * outer).next_multiple_of(simd::MAX_LANES);
+    let products = (wide + 2 * radius).next_multiple_of(simd::MAX_LANES);
     [wide, products, products + 2 * reach]
 }
 

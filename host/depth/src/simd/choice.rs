@@ -110,6 +110,7 @@ fn decide_generic<L: Lanes>(
     for x in 0..width {
         let count = counts[x].max(1.0);
         let mean = differences[x] / count;
+        // A division in the branch would keep the loop from being vectorised.
         let mean_larger = larger[x] / count;
         let curved = if counts[x] > 0.0 { large[x] - mean_larger } else { 0.0 };
         let flat = mean <= NOT_FLAT;

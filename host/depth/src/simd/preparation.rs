@@ -3,7 +3,7 @@
 
 use super::dispatch;
 use super::lanes::Lanes;
-use super::windows::{TOGETHER, add_products_generic};
+use super::windows::{MAX_LANES, add_products_generic};
 
 dispatch! {
     /// Adds the first row to `sums` and takes the second one off; `to` is their `share`.
@@ -105,19 +105,19 @@ fn compare_generic<L: Lanes>(
 ) -> [f32; 3] {
     let width = different.len();
     let (product, of_far, of_near) = (&product[..width], &of_far[..width], &of_near[..width]);
-    let mut sums = [[0.0_f32; TOGETHER]; 3];
-    let whole = width - width % TOGETHER;
-    for x in (0..whole).step_by(TOGETHER) {
-        let mut differs = [false; TOGETHER];
-        let [product, of_far, of_near] = [product, of_far, of_near].map(|row| &row[x..x + TOGETHER]);
-        for i in 0..TOGETHER {
+    let mut sums = [[0.0_f32; MAX_LANES]; 3];
+    let whole = width - width % MAX_LANES;
+    for x in (0..whole).step_by(MAX_LANES) {
+        let mut differs = [false; MAX_LANES];
+        let [product, of_far, of_near] = [product, of_far, of_near].map(|row| &row[x..x + MAX_LANES]);
+        for i in 0..MAX_LANES {
             let found = compare_pixel(noise, limits, [product[i], of_far[i], of_near[i]]);
             differs[i] = found.differs;
             sums[0][i] += found.correlation;
             sums[1][i] += found.largest;
             sums[2][i] += found.counted;
         }
-        different[x..x + TOGETHER].copy_from_slice(&differs);
+        different[x..x + MAX_LANES].copy_from_slice(&differs);
     }
     for x in whole..width {
         let found = compare_pixel(noise, limits, [product[x], of_far[x], of_near[x]]);

@@ -9,8 +9,7 @@ const LARGEST_ALPHA: f32 = 1.2;
 /// Slope of the cubic, relative to c1, below which Newton's step is shortened.
 const SLOPE_FLOOR: f32 = 0.05;
 const STEPS: usize = 3;
-/// Lanes of the widest vector.
-pub(crate) const TOGETHER: usize = 16;
+pub(crate) const MAX_LANES: usize = 16;
 
 dispatch! {
     /// Sums over `window` columns: `values` is at least `window - 1` longer than `sums`; `work` has twice the size.
@@ -31,7 +30,7 @@ fn row_sums_generic<L: Lanes>(values: &[f32], window: usize, work: &mut [f32], s
     let at = |d: usize| &values[d..][..width];
     // The usual windows in two passes: sums of four, then of those. Their order is that of the loop below.
     // Whole vectors, where the values suffice.
-    let mut length = (width + window - 4).next_multiple_of(TOGETHER).min(values.len() - 3);
+    let mut length = (width + window - 4).next_multiple_of(MAX_LANES).min(values.len() - 3);
     let quads = &mut here[..length];
     let (a, b) = (&values[..length], &values[1..][..length]);
     let (c, d) = (&values[2..][..length], &values[3..][..length]);

@@ -214,17 +214,16 @@ impl<'a> Images<'a> {
         self.gains = gains.iter().map(|gain| *gain as f32).collect();
     }
 
-    /// Divides out vignetting that changes over the stack, after the images' brightness; returns its largest change as a logarithm, 0
-    /// without.
-    pub fn even_vignetting(&self, positions: &[f64]) -> Result<f64> {
-        let Some(trend) = Trend::of(&frames::blocks(self)?, positions) else { return Ok(0.0) };
+    /// Divides out vignetting that changes over the stack, after the images' brightness; returns its largest change as a logarithm.
+    pub fn even_vignetting(&self, positions: &[f64]) -> Result<Option<f64>> {
+        let Some(trend) = Trend::of(&frames::blocks(self)?, positions) else { return Ok(None) };
         for (index, position) in positions.iter().enumerate() {
             self.context.cancel.check("evening out the stack")?;
             let mut image = self.stored(index, 0..self.dim(index).0)?;
             trend.divide(&mut image, *position);
             self.write(index, image.view())?;
         }
-        Ok(trend.change)
+        Ok(Some(trend.change))
     }
 
     /// Removes the lens' distortion from all images and moves each by its warp, NaN where it does not show the scene. Where the

@@ -9,7 +9,10 @@ use farnear_capture::{
 };
 use farnear_protocol::{
     Micros, Nanometres, Settle,
-    message::{Alarm, Axis, Calibration, Limits, Routine, Setting, SettingKey, ShotRecord, StepperKeys},
+    message::{
+        Alarm, Axis, Calibration, Limits, Routine, Setting, SettingKey, ShotRecord, StepperKeys,
+        strobe_tolerance,
+    },
 };
 
 use super::{Checkup, EquippedRig, Found, failed, passed, passed_over};
@@ -18,10 +21,8 @@ use super::{Checkup, EquippedRig, Found, failed, passed, passed_over};
 const SLOW_NM_PER_S: i32 = 500_000;
 /// Largest difference between two homings.
 const REPEATS_UM: f64 = 1.5;
-/// Exposures of the strobe check, and tolerance of the strobe's length, as of the board: time, and divisor of the exposure.
+/// Exposures of the strobe check.
 const EXPOSURES: u16 = 5;
-const STROBE_US: u64 = 100;
-const CLOCKS_APART: u64 = 5_000;
 
 fn range(axis: Axis, limits: &Limits) -> (i32, i32) {
     let (min, max) = limits.of(axis);
@@ -202,7 +203,7 @@ pub(super) fn strobe(checkup: &mut Checkup<'_>) -> Found {
     let latency = |record: &ShotRecord| record.strobe_start.0.saturating_sub(record.trigger.0);
     let worst = records.iter().map(off).max().unwrap_or(0);
     let latest = records.iter().map(latency).max().unwrap_or(0);
-    if worst > STROBE_US + u64::from(exposure.0) / CLOCKS_APART {
+    if worst > u64::from(strobe_tolerance(exposure).0) {
         return failed(format!("a strobe was {worst} us longer or shorter than the exposure asked for"));
     }
     passed(format!(
