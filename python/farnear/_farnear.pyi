@@ -12,6 +12,7 @@ class _ArrayLike(Protocol):
 
 Image = Union[NDArray[np.integer[Any]], NDArray[np.floating[Any]], _ArrayLike]
 Map = Image
+Part = Union[tuple[int, int, int, int], tuple[int, int, int, int, int]]
 Mask = Union[NDArray[np.bool_], NDArray[np.integer[Any]], _ArrayLike]
 Path = Union[str, "os.PathLike[str]"]
 Stack = Union[Sequence[Image], NDArray[Any]]
@@ -41,7 +42,7 @@ class RigError(RuntimeError):
     """The rig, its camera or the way to them failed."""
 
 class Optics:
-    """Telecentric thin-lens geometry of a pair whose sensor moves; immutable.
+    """Thin-lens geometry of a pair whose sensor moves; immutable.
 
     The normalised depth `alpha` is -1 at the far focus and +1 at the near focus.
 
@@ -189,8 +190,9 @@ class DepthMap:
         Part of the pixels with a depth, 0 to 1.
     optics : Optics
         The optics of the map.
-    part : (int, int, int, int) or None
-        Column and row of the map in its images, and width and height of these, px; None if the map shows whole images.
+    part : (int, int, int, int), (int, int, int, int, int) or None
+        Column and row of the map in its images, width and height of these, px, and the pixels per side that were averaged, if more
+        than one; None if the map shows whole images.
 
     Examples
     --------
@@ -223,8 +225,8 @@ class DepthMap:
     def optics(self) -> Optics:
         """The optics of the map."""
     @property
-    def part(self) -> Optional[tuple[int, int, int, int]]:
-        """Column and row of the map in its images, and width and height of these, px; None if the map shows whole images."""
+    def part(self) -> Optional[Part]:
+        """Place of the map in its images, as `points_mm` takes it; None if the map shows whole images."""
     @staticmethod
     def load(folder: Path) -> "DepthMap":
         """Read a folder that `farnear depth` or `DepthMap.save` wrote, with `depth.npy` or `depth.tiff` and `depth.toml`.
@@ -251,6 +253,9 @@ class DepthMap:
         Plane
             Distance, slopes, tilt, and what is left.
         """
+    @property
+    def _intrinsics_px(self) -> tuple[float, float, float]:
+        """Principal distance, and column and row of the optical axis in the map, px; NaN for a lens without a scale."""
     def plot(self, ax: Optional[Any] = None) -> Any:
         """Plot the map with matplotlib: colours by depth in mm; returns the axes."""
     def to_xarray(self) -> Any:
@@ -472,9 +477,7 @@ def focus_stack(
     'mm'
     """
 
-def points_mm(
-    depth_mm: Map, optics: Optics, *, part: Optional[tuple[int, int, int, int]] = None
-) -> NDArray[np.float32]:
+def points_mm(depth_mm: Map, optics: Optics, *, part: Optional[Part] = None) -> NDArray[np.float32]:
     """Object point that each pixel of a depth map sees.
 
     Parameters
@@ -484,9 +487,9 @@ def points_mm(
         `calibrate_stack`, whose depths may be relative, NaN only.
     optics : Optics
         The optics of the map; those of `calibrate_stack` need its `object_pixel_um`.
-    part : (int, int, int, int), optional
-        `DepthMap.part`: column and row of the map in its images, and width and height of these, px; by default the map shows
-        whole images.
+    part : (int, int, int, int) or (int, int, int, int, int), optional
+        `DepthMap.part`: column and row of the map in its images, width and height of these, px, and the pixels per side that were
+        averaged; by default the map shows whole images.
 
     Returns
     -------
@@ -506,7 +509,7 @@ class Processor:
     Parameters
     ----------
     optics : Optics
-        The optics of the pairs; those of `calibrate_stack` are for `depth`.
+        The optics of the pairs; those of `calibrate_stack`, or with a `[distortion]`, are for `depth`.
     operators : Operators, optional
         By default they are designed for the optics.
     smoothing_px : int
@@ -619,6 +622,8 @@ class PsfFit:
         The point spread function as `Optics(psf=...)` accepts it.
     verdict : str
         "good"; "loose" if `k` is open by more than 1 %; "unexplained" if more is left than noise.
+    findings : list of str
+        What to know before trusting the fit.
     k : float
         Width over blur radius; of a free profile that of a Gaussian with the same second moment.
     standard_error_k, standard_error_p : float or None
@@ -641,6 +646,9 @@ class PsfFit:
         """-"""
     @property
     def verdict(self) -> Literal["good", "loose", "unexplained"]:
+        """-"""
+    @property
+    def findings(self) -> list[str]:
         """-"""
     @property
     def k(self) -> float:
@@ -708,6 +716,8 @@ class StackFit:
         The lens, for `depth`.
     verdict : str
         "good", or what to change.
+    findings : list of str
+        What to know before trusting the lens.
     pair_step : int
         Slices from the far to the near image of a pair.
     bin : int
@@ -731,6 +741,9 @@ class StackFit:
         """-"""
     @property
     def verdict(self) -> str:
+        """-"""
+    @property
+    def findings(self) -> list[str]:
         """-"""
     @property
     def pair_step(self) -> int:

@@ -36,13 +36,10 @@ def camera_matrix(found: DepthMap) -> list[float]:
     """Camera matrix of a map, row by row, px.
 
     Rays of a telecentric lens meet in its front focus, so a pixel of pitch p sees p (z - F) / F: as a pinhole at the front focus
-    with the focal length F / p.
+    with the focal length F / p. Without telecentricity the pinhole is the lens, as far away as the sensor of the far image.
     """
-    height, width = found.depth_mm.shape
-    column, row, image_width, image_height = found.part or (0, 0, width, height)
-    focal_px = found.optics.focal_length_mm / (1e-3 * found.optics.pixel_um)
-    axis_px = (0.5 * (image_width - 1) - column, 0.5 * (image_height - 1) - row)
-    return [focal_px, 0.0, axis_px[0], 0.0, focal_px, axis_px[1], 0.0, 0.0, 1.0]
+    focal_px, column, row = found._intrinsics_px
+    return [focal_px, 0.0, column, 0.0, focal_px, row, 0.0, 0.0, 1.0]
 
 
 def points_if_known(found: DepthMap) -> Optional[NDArray[np.float32]]:
@@ -70,7 +67,7 @@ class McapRecording:
     `object_pixel_um`.
 
     Depth is measured from the lens, while rays of a telecentric lens meet in its front focus: the point cloud is exact; a cloud that a
-    viewer computes from the depth image as of a pinhole is wider by F / (z - F).
+    viewer computes from the depth image as of a pinhole is wider by F / (z - F). Both are exact without telecentricity.
 
     Parameters
     ----------

@@ -2,8 +2,10 @@
 
 use farnear_depth::{
     calibrate::{CapturedPair, Model, fit_psf, made_ready},
+    mosaic::{self, is_mosaic},
     prepare::Align,
 };
+use farnear_workflows::calibrate::psf::doubt;
 use pyo3::prelude::*;
 
 use crate::{
@@ -23,6 +25,8 @@ use crate::{
 ///     The point spread function as `Optics(psf=...)` accepts it.
 /// verdict : str
 ///     "good"; "loose" if `k` is open by more than 1 %; "unexplained" if more is left than noise.
+/// findings : list of str
+///     What to know before trusting the fit.
 /// k : float
 ///     Width over blur radius; of a free profile that of a Gaussian with the same second moment.
 /// standard_error_k, standard_error_p : float or None
@@ -40,6 +44,7 @@ pub struct PsfFit {
     optics: Optics,
     psf: String,
     verdict: String,
+    findings: Vec<String>,
     k: f64,
     standard_error_k: Option<f64>,
     standard_error_p: Option<f64>,
@@ -50,7 +55,8 @@ pub struct PsfFit {
 }
 
 /// Arguments of `PsfFit._assemble`.
-type Parts = (Optics, String, String, f64, [Option<f64>; 2], [f64; 2], Vec<f64>, Vec<(f64, f64, f64)>);
+type Parts =
+    (Optics, String, String, Vec<String>, f64, [Option<f64>; 2], [f64; 2], Vec<f64>, Vec<(f64, f64, f64)>);
 
 #[pymethods]
 impl PsfFit {
@@ -60,6 +66,7 @@ impl PsfFit {
             self.optics.clone(),
             self.psf.clone(),
             self.verdict.clone(),
+            self.findings.clone(),
             self.k,
             [self.standard_error_k, self.standard_error_p],
             [self.residual, self.noise_residual],
@@ -76,6 +83,7 @@ impl PsfFit {
         optics: Optics,
         psf: String,
         verdict: String,
+        findings: Vec<String>,
         k: f64,
         standard_errors: [Option<f64>; 2],
         residuals: [f64; 2],
@@ -88,6 +96,7 @@ impl PsfFit {
             optics,
             psf,
             verdict,
+            findings,
             k,
             standard_error_k,
             standard_error_p,
@@ -161,6 +170,7 @@ pub fn calibrate_psf<'py>(
         owned.push(([far.view().to_owned(), near.view().to_owned()], true_mm.map(|mm| optics.0.alpha(mm))));
     }
     let lens = optics.0;
+    let is_raw = owned.iter().any(|([far, _], _)| is_mosaic(far.view()));
     let fit = work::watched(py, move || {
         let mut ready = Vec::with_capacity(owned.len());
         for (images, alpha) in owned {
@@ -172,10 +182,12 @@ pub fn calibrate_psf<'py>(
             .collect();
         fit_psf(&captured, &lens, model).map_err(wrong)
     })??;
+    let findings = is_raw.then(|| mosaic::WORDS.to_owned()).into_iter().chain(doubt(&fit, model)).collect();
     Ok(PsfFit {
         optics: Optics(lens.with_psf(fit.psf)),
         psf: psf_text(fit.psf)?,
         verdict: fit.verdict().to_string(),
+        findings,
         k: fit.width(),
         standard_error_k: fit.standard_error_k,
         standard_error_p: fit.standard_error_p,

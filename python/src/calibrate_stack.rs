@@ -3,7 +3,11 @@
 use std::sync::atomic::Ordering;
 
 use farnear_depth::calibrate::stack::{self, Moved, StackSettings};
-use farnear_workflows::{calibrate::stack::verdict, figures::rounded_for, focus_stack::fill_specks};
+use farnear_workflows::{
+    calibrate::stack::{curved_light, filled_pixels, raw_mosaic, verdict},
+    figures::rounded_for,
+    focus_stack::fill_specks,
+};
 use ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::prelude::*;
@@ -24,6 +28,8 @@ use crate::{
 ///     The lens, for `depth`.
 /// verdict : str
 ///     "good", or what to change.
+/// findings : list of str
+///     What to know before trusting the lens.
 /// pair_step : int
 ///     Slices from the far to the near image of a pair.
 /// bin : int
@@ -44,6 +50,7 @@ use crate::{
 pub struct StackFit {
     optics: Optics,
     verdict: String,
+    findings: Vec<String>,
     pair_step: usize,
     bin: usize,
     robust_mm: f64,
@@ -58,7 +65,7 @@ pub struct StackFit {
 
 /// Arguments of `StackFit._assemble`.
 type Parts<'py> =
-    (Optics, String, [usize; 2], [f64; 6], Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
+    (Optics, String, Vec<String>, [usize; 2], [f64; 6], Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
 
 #[pymethods]
 impl StackFit {
@@ -67,6 +74,7 @@ impl StackFit {
         let parts = (
             self.optics.clone(),
             self.verdict.clone(),
+            self.findings.clone(),
             [self.pair_step, self.bin],
             [self.robust_mm, self.rms_mm, self.bias_mm, self.slope, self.fill, self.within_three],
             self.by_depth.bind(py).clone(),
@@ -80,6 +88,7 @@ impl StackFit {
     fn _assemble(
         optics: Optics,
         verdict: String,
+        findings: Vec<String>,
         steps: [usize; 2],
         errors: [f64; 6],
         by_depth: Bound<'_, PyArray2<f64>>,
@@ -90,6 +99,7 @@ impl StackFit {
         Self {
             optics,
             verdict,
+            findings,
             pair_step,
             bin,
             robust_mm,
@@ -151,8 +161,9 @@ pub fn calibrate_stack<'py>(
     bin: Option<usize>,
 ) -> PyResult<StackFit> {
     let (mut slices, full_scale) = stack_of(&images)?;
+    let mut filled = 0;
     for (index, slice) in slices.iter_mut().enumerate() {
-        fill_specks(slice, full_scale.is_none());
+        filled += fill_specks(slice, full_scale.is_none()).len();
         if let Some(((row, column), _)) = slice.indexed_iter().find(|(_, value)| !value.is_finite()) {
             return Err(FarnearError::new_err(format!(
                 "images[{index}]: the pixel in column {column}, row {row} has no value: crop or fill it"
@@ -177,6 +188,10 @@ pub fn calibrate_stack<'py>(
     let by_depth = Array2::from(rows);
     Ok(StackFit {
         verdict: verdict(&found),
+        findings: [raw_mosaic(&slices[0]), filled_pixels(filled), curved_light(&found, &slices)]
+            .into_iter()
+            .flatten()
+            .collect(),
         pair_step: stage.pair_step,
         bin: stage.bin,
         robust_mm: held_out.robust_mm,

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use farnear_depth::corrections::{self, CdcSettings, Method, Pattern};
+use farnear_workflows::calibrate::correction::check_distance;
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::prelude::*;
 
@@ -44,6 +45,7 @@ impl Correction {
         let mut maps = Vec::with_capacity(patterns.len());
         for (index, (map, true_mm)) in patterns.iter().enumerate() {
             let map: Map<'_> = named(&format!("patterns[{index}][0]"), map)?;
+            check_distance(index, &Pattern { depth_mm: map.view(), true_mm: *true_mm }).map_err(wrong)?;
             maps.push((map.view().to_owned(), *true_mm));
         }
         let fit = move || {

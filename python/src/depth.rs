@@ -10,7 +10,7 @@ use farnear_depth::{
     prepare::PrepareSettings,
 };
 use farnear_workflows::{
-    depth::{DepthRequest, tone},
+    depth::{DepthRequest, part::Part, tone},
     optics::{OpticsDoubt, another_size, usable_bin},
 };
 use std::sync::{Mutex, PoisonError};
@@ -171,6 +171,8 @@ pub fn depth(
     let mut doubts: Vec<OpticsDoubt> = optics.0.doubts().into_iter().map(OpticsDoubt::Unusual).collect();
     doubts.extend(another_size(&optics.0, far.view().dim()));
     let side = bin.side(&optics.0, &far, operators.is_some(), &mut doubts)?;
+    let bins = side * optics.0.stage().map_or(1, |stage| stage.bin);
+    let part = Part::of_bins(far.view().dim(), bins);
     let averaged = (side > 1).then(|| Optics(optics.0.binned(side)));
     let optics = averaged.as_ref().unwrap_or(optics);
     let designed;
@@ -217,7 +219,7 @@ pub fn depth(
     .map_err(wrong)?;
     found.findings.extend(curved.map(Finding::Run));
     found.findings.extend(doubts.into_iter().map(|doubt| Finding::Run(doubt.to_string())));
-    Ok(DepthMap::of(py, found, optics))
+    Ok(DepthMap::of(py, found, optics, part))
 }
 
 impl Bin {
@@ -229,19 +231,22 @@ impl Bin {
         has_operators: bool,
         doubts: &mut Vec<OpticsDoubt>,
     ) -> PyResult<usize> {
-        if self.0 == Some(1) {
+        // Pixels are averaged only on request, or for optics that were calibrated so.
+        let alone = self.0 == Some(1) || self.0.is_none() && has_operators;
+        if alone {
             let (blur_px, bin) = (optics.max_blur_px(), usable_bin(optics));
             doubts.extend((bin > 1).then_some(OpticsDoubt::TooMuchBlur { blur_px, bin, binned: false }));
-            return Ok(1);
         }
         match self.0 {
-            Some(side) if has_operators || optics.stage().is_some() => Err(FarnearError::new_err(format!(
-                "bin is {side}; operators and optics of calibrate_stack are for pixels of one size: give no bin"
-            ))),
-            None if has_operators => Ok(1),
+            Some(side @ 2..) if has_operators || optics.stage().is_some() => {
+                Err(FarnearError::new_err(format!(
+                    "bin is {side}; operators and optics of calibrate_stack are for pixels of one size: give no bin"
+                )))
+            }
             bin => {
+                let bin = if alone { Some(1) } else { bin };
                 let request = DepthRequest { bin, ..DepthRequest::default() };
-                Ok(request.bin_for(optics, is_mosaic(far.view()), doubts))
+                Ok(request.bin_for(optics, !alone && is_mosaic(far.view()), doubts))
             }
         }
     }
@@ -274,7 +279,7 @@ fn limits(image: &Image<'_>, white_level: Option<u32>) -> PyResult<Option<[f32; 
 /// Parameters
 /// ----------
 /// optics : Optics
-///     The optics of the pairs; those of `calibrate_stack` are for `depth`.
+///     The optics of the pairs; those of `calibrate_stack`, or with a `[distortion]`, are for `depth`.
 /// operators : Operators, optional
 ///     By default they are designed for the optics.
 /// smoothing_px : int
@@ -319,6 +324,11 @@ impl Processor {
         if optics.0.stage().is_some() {
             return Err(FarnearError::new_err(
                 "the optics were learned by calibrate stack for method whitened, which a Processor lacks: use farnear.depth",
+            ));
+        }
+        if optics.0.distortion().is_some() {
+            return Err(FarnearError::new_err(
+                "the optics have a [distortion], which a Processor does not remove from the images: use farnear.depth",
             ));
         }
         let settings = Settings { smoothing_px, median_px, threads, ..filling(&fill, low_texture)? };

@@ -13,7 +13,10 @@ use farnear_workflows::{
 };
 use ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
-use pyo3::{prelude::*, types::PyBytes};
+use pyo3::{
+    prelude::*,
+    types::{PyBytes, PyTuple},
+};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -22,11 +25,40 @@ use crate::{
     work,
 };
 
-/// Column and row of a map in its images, and width and height of these.
-pub type Place = (usize, usize, usize, usize);
+/// Place of a map in its images: four numbers in Python, five where pixels were averaged.
+#[derive(Clone, Copy)]
+pub struct Place(pub Part);
 
-pub fn part_of((x, y, image_width, image_height): Place) -> Part {
-    Part { x, y, image_width, image_height, bin: 1 }
+impl<'py> FromPyObject<'_, 'py> for Place {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        let (x, y, image_width, image_height, bin) = if object.len()? == 5 {
+            object.extract::<(usize, usize, usize, usize, usize)>()?
+        } else {
+            let (x, y, width, height) = object.extract::<(usize, usize, usize, usize)>()?;
+            (x, y, width, height, 1)
+        };
+        if bin == 0 {
+            let message = format!("part is {}; expected a fifth number of at least 1", object.repr()?);
+            return Err(FarnearError::new_err(message));
+        }
+        Ok(Self(Part { x, y, image_width, image_height, bin }))
+    }
+}
+
+impl<'py> IntoPyObject<'py> for Place {
+    type Target = PyTuple;
+    type Output = Bound<'py, PyTuple>;
+    type Error = PyErr;
+
+    fn into_pyobject(self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let Part { x, y, image_width, image_height, bin } = self.0;
+        match bin {
+            1 => (x, y, image_width, image_height).into_pyobject(py),
+            _ => (x, y, image_width, image_height, bin).into_pyobject(py),
+        }
+    }
 }
 
 /// Used contents of `depth.toml`; the command line writes more.
@@ -61,8 +93,9 @@ struct Record {
 ///     Part of the pixels with a depth, 0 to 1.
 /// optics : Optics
 ///     The optics of the map.
-/// part : (int, int, int, int) or None
-///     Column and row of the map in its images, and width and height of these, px; None if the map shows whole images.
+/// part : (int, int, int, int), (int, int, int, int, int) or None
+///     Column and row of the map in its images, width and height of these, px, and the pixels per side that were averaged, if more
+///     than one; None if the map shows whole images.
 ///
 /// Examples
 /// --------
@@ -86,7 +119,7 @@ pub struct DepthMap {
     valid_fraction: f64,
     /// The optics of the map.
     optics: Optics,
-    /// Column and row of the map in its images, and width and height of these, px; None if the map shows whole images.
+    /// Place of the map in its images, as `points_mm` takes it; None if the map shows whole images.
     part: Option<Place>,
 }
 
@@ -113,7 +146,7 @@ impl DepthMap {
             findings: found.findings.iter().map(ToString::to_string).collect(),
             valid_fraction: validity.valid_fraction,
             optics: optics.clone(),
-            part: None,
+            part: part.map(Place),
         }
     }
 
@@ -182,6 +215,13 @@ impl DepthMap {
         } else {
             Array2::zeros(dim)
         };
+        if record.part.is_some_and(|part| part.bin == 0 || !part.fits(dim)) {
+            let (rows, columns) = dim;
+            return Err(FarnearError::new_err(format!(
+                "{}: its [part] does not fit the map of {columns}x{rows} px",
+                folder.join("depth.toml").display()
+            )));
+        }
         let valid = depth.iter().filter(|depth| depth.is_finite()).count();
         Ok(Self {
             valid_fraction: valid as f64 / depth.len().max(1) as f64,
@@ -191,10 +231,7 @@ impl DepthMap {
             reasons: reasons.into_pyarray(py).unbind(),
             findings: record.warnings,
             optics: Optics(record.optics),
-            part: record
-                .part
-                .filter(|part| part.bin == 1)
-                .map(|part| (part.x, part.y, part.image_width, part.image_height)),
+            part: record.part.map(Place),
         })
     }
 
@@ -220,7 +257,7 @@ impl DepthMap {
             made_by: MADE_BY.into(),
             units: "mm".into(),
             warnings: self.findings.clone(),
-            part: self.part.map(part_of),
+            part: self.part.map(|place| place.0),
             optics: self.optics.0,
         };
         write("depth.toml", toml::to_string(&record).map_err(wrong)?.as_bytes())?;
@@ -255,7 +292,7 @@ impl DepthMap {
             );
             return Err(FarnearError::new_err(message));
         }
-        let lateral = measure::lateral(&self.optics.0, self.part.map(part_of));
+        let lateral = measure::lateral(&self.optics.0, self.part.map(|place| place.0));
         let part = Rectangle { x, y, width: columns, height: rows };
         let plane = measure::fit(depth, lateral, part)
             .ok_or_else(|| FarnearError::new_err("fewer than three depths, or all in a line: no plane"))?;
@@ -267,6 +304,19 @@ impl DepthMap {
             rms_mm: plane.rms_mm,
             peak_to_valley_mm: plane.peak_to_valley_mm,
         })
+    }
+
+    /// Principal distance, and column and row of the optical axis in the map, px; NaN for a lens without a scale.
+    #[getter]
+    fn _intrinsics_px(&self, py: Python<'_>) -> (f64, f64, f64) {
+        let dim = self.depth_mm.bind(py).readonly().as_array().dim();
+        match measure::lateral(&self.optics.0, self.part.map(|place| place.0)) {
+            Lateral::Lens(lens) => {
+                let [column, row] = lens.axis_in(dim);
+                (lens.distance_mm / (1e-3 * lens.pixel_um), column, row)
+            }
+            Lateral::Pixel(_) | Lateral::Unknown => (f64::NAN, f64::NAN, f64::NAN),
+        }
     }
 
     /// Plot the map with matplotlib: colours by depth in mm; returns the axes.

@@ -14,7 +14,7 @@ use farnear_depth::{
 };
 use farnear_workflows::{
     Cancel, Context, Unattended,
-    focus_stack::{depth_of_places, even_positions, prepare_stack},
+    focus_stack::{depth_of_places, even_positions, prepare_stack, scarce},
 };
 use ndarray::{ArrayView2, CowArray, Ix2};
 use numpy::{IntoPyArray, PyArray2};
@@ -214,6 +214,7 @@ pub fn focus_stack<'py>(
         let depth = depth_of_places(&map.place, &prepared.positions, in_mm);
         Ok((map, depth, prepared))
     })??;
+    let findings = prepared.warnings.into_iter().chain(scarce(&depth, &map)).collect();
     Ok(FocusStack {
         depth: depth.into_pyarray(py).unbind(),
         unit: unit_of(in_mm),
@@ -221,7 +222,7 @@ pub fn focus_stack<'py>(
         all_in_focus: map.all_in_focus.into_pyarray(py).unbind(),
         moved_px: prepared.moved_px,
         left_out: prepared.left_out,
-        findings: prepared.warnings,
+        findings,
     })
 }
 

@@ -27,7 +27,7 @@ fn psf_of(text: &str) -> PyResult<Psf> {
     if text.contains('\n') { toml::from_str(text).map_err(wrong) } else { text.parse().map_err(wrong) }
 }
 
-/// Telecentric thin-lens geometry of a pair whose sensor moves; immutable.
+/// Thin-lens geometry of a pair whose sensor moves; immutable.
 ///
 /// The normalised depth `alpha` is -1 at the far focus and +1 at the near focus.
 ///

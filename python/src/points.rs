@@ -1,11 +1,12 @@
 //! Points of a depth map in space.
 
+use farnear_workflows::depth::part::Part;
 use numpy::{IntoPyArray, PyArray3};
 use pyo3::prelude::*;
 
 use crate::{
     arrays::{Map, named, optics_named},
-    depth_map::{Place, part_of},
+    depth_map::Place,
     errors::{FarnearError, wrong},
     work,
 };
@@ -19,9 +20,9 @@ use crate::{
 ///     `calibrate_stack`, whose depths may be relative, NaN only.
 /// optics : Optics
 ///     The optics of the map; those of `calibrate_stack` need its `object_pixel_um`.
-/// part : (int, int, int, int), optional
-///     `DepthMap.part`: column and row of the map in its images, and width and height of these, px; by default the map shows
-///     whole images.
+/// part : (int, int, int, int) or (int, int, int, int, int), optional
+///     `DepthMap.part`: column and row of the map in its images, width and height of these, px, and the pixels per side that were
+///     averaged; by default the map shows whole images.
 ///
 /// Returns
 /// -------
@@ -46,17 +47,16 @@ pub fn points_mm<'py>(
     // Integer maps mark holes by 0, and nothing within the focal length is imaged. `calibrate_stack` gives relative depths.
     let limit_mm = optics.0.stage().map_or(optics.0.focal_length_mm() as f32, |_| f32::NEG_INFINITY);
     let depth_mm = depth_mm.view().mapv(|mm| if mm > limit_mm { mm } else { f32::NAN });
-    let (rows, columns) = depth_mm.dim();
-    let lies_within =
-        |begin: usize, size: usize, all: usize| begin.checked_add(size).is_some_and(|end| end <= all);
-    if let Some(part @ (x, y, width, height)) = part
-        && !(lies_within(x, columns, width) && lies_within(y, rows, height))
-    {
+    let part = part.map(|place| place.0);
+    if let Some(part) = part.filter(|part| !part.fits(depth_mm.dim())) {
+        let (rows, columns) = depth_mm.dim();
+        let Part { x, y, image_width, image_height, bin } = part;
         return Err(FarnearError::new_err(format!(
-            "part is {part:?} for a map of {columns}x{rows} px; expected its column and row, and width and height of the images"
+            "part is {:?} for a map of {columns}x{rows} px; expected its column and row, width and height of the images, and the pixels \
+             per side that were averaged",
+            (x, y, image_width, image_height, bin)
         )));
     }
-    let part = part.map(part_of);
     let points = work::run(py, || farnear_workflows::measure::points_mm(depth_mm.view(), &optics.0, part))?;
     Ok(points.map_err(wrong)?.into_pyarray(py))
 }

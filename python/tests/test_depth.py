@@ -161,6 +161,8 @@ def test_corrections_take_a_bowl_away(tmp_path):
         file = tmp_path / "correction.toml"
         file.write_text(correction.dumps())
         assert np.array_equal(farnear.Correction.load(file).apply(910 + bowl), corrected)
+    with pytest.raises(farnear.FarnearError, match="0.932 of pattern 1.*in mm"):
+        farnear.Correction.fit([(depth, true / 1000) for depth, true in targets], method="clsf")
     with pytest.raises(farnear.FarnearError, match="4"):
         farnear.Correction.fit(targets[:2], method="clsf")
     with pytest.raises(farnear.FarnearError, match="60"):
@@ -181,3 +183,12 @@ def test_rendering_repeats(optics):
 def test_a_good_pair_has_no_warning(optics, scene):
     far, near, _ = farnear.render(optics, scene, width=320, height=240, seed=2)
     assert farnear.depth(far, near, optics).findings == []
+
+
+def test_a_lens_with_little_blur_is_doubted():
+    little = farnear.Optics(focal_length_mm=50, aperture_mm=12.8, pixel_um=7.4, far_mm=933, max_blur_px=1.0, psf="gaussian:k=0.4578")
+    far, near, _ = farnear.render(little, "slant", width=160, height=120)
+    assert any("a largest blur of 1.00 px" in finding for finding in farnear.depth(far, near, little).findings)
+    operators = farnear.Operators(little)
+    findings = farnear.depth(far, near, little, operators=operators, bin="auto").findings
+    assert any("a largest blur of 1.00 px" in finding for finding in findings), findings

@@ -128,6 +128,30 @@ def test_a_map_of_a_region_keeps_its_place(optics, slant, tmp_path):
     assert camera_matrix(region)[2] == camera_matrix(whole)[2] - 200 and camera_matrix(region)[5] == camera_matrix(whole)[5] - 10
 
 
+def test_a_map_of_averaged_pixels_keeps_its_axis(optics, tmp_path):
+    far, near, _ = farnear.render(optics, "slant", width=323, height=242, seed=2)
+    found = farnear.depth(far, near, optics, bin=4)
+    assert found.depth_mm.shape == (60, 80) and found.part == (0, 0, 323, 242, 4)
+    found.save(tmp_path / "result")
+    for same_map in (found, farnear.DepthMap.load(tmp_path / "result"), pickle.loads(pickle.dumps(found))):
+        assert same_map.part == found.part
+        # Column 161 is the middle of 323; a column of four has its middle 1.5 columns further.
+        assert camera_matrix(same_map)[2] == (161 - 1.5) / 4 and camera_matrix(same_map)[5] == (120.5 - 1.5) / 4
+    points = farnear.points_mm(np.full((60, 80), 900.0), found.optics, part=found.part)
+    step_mm = 4 * 7.4e-3 * 850 / 50
+    assert points[10, 40, 0] == pytest.approx((40 - 39.875) * step_mm, rel=1e-4)
+    assert farnear.depth(far[:240, :320], near[:240, :320], optics, bin=4).part is None
+    with pytest.raises(farnear.FarnearError, match="at least 1"):
+        farnear.points_mm(found.depth_mm, optics, part=(0, 0, 323, 242, 0))
+
+
+def test_the_axis_is_the_centre_of_the_distortion(optics):
+    distortion = "[distortion]\ncamera_matrix = [[6700.0, 0, 30.5], [0, 6700.0, 20.0], [0, 0, 1]]\ncoefficients = [0.0, 0.0, 0.0, 0.0]\n"
+    off_centre = farnear.Optics.loads(f"{optics.dumps()}\n{distortion}")
+    points = farnear.points_mm(np.full((40, 64), 900.0), off_centre)
+    assert points[20, 30, 0] < 0 < points[20, 31, 0] and points[20, 30, 1] == 0
+
+
 def test_a_folder_that_is_no_result_is_named(tmp_path, found):
     with pytest.raises(FileNotFoundError):
         farnear.DepthMap.load(tmp_path)
@@ -176,11 +200,13 @@ def test_optics_accept_a_calibrated_point_spread_function(optics, model):
     )
     assert again.psf == fit.psf == fit.optics.psf
     assert fit.verdict in ("good", "loose") and abs(fit.k - 0.4578) < 0.01
+    assert bool(fit.findings) == (fit.verdict != "good"), fit.findings
     assert 0 < fit.standard_error_k < 0.02 and 0 <= fit.residual < 0.1
     assert (fit.standard_error_p is not None) == (model == "generalised")
     assert bool(fit.otf) == (model == "free")
     copied = pickle.loads(pickle.dumps(fit))
     assert copied.optics == fit.optics and (copied.psf, copied.verdict, copied.k) == (fit.psf, fit.verdict, fit.k)
+    assert copied.findings == fit.findings
     for name in ("standard_error_k", "standard_error_p", "residual", "noise_residual", "alphas", "otf"):
         assert getattr(copied, name) == getattr(fit, name), name
     assert np.isfinite(farnear.depth(*pairs[0][:2], fit.optics).depth_mm).mean() > 0.8
@@ -283,9 +309,13 @@ def test_a_lens_is_calibrated_from_a_stack_and_measures_its_pairs():
     measured, true = fit.response.T
     assert np.all(np.diff(measured) > 0) and np.all(np.diff(true) >= 0) and true[0] < -0.5 and true[-1] > 0.5, fit.response
     copied = pickle.loads(pickle.dumps(fit))
-    assert copied.optics == fit.optics and copied.verdict == fit.verdict
+    assert copied.optics == fit.optics and (copied.verdict, copied.findings) == (fit.verdict, fit.findings)
     for name in ("pair_step", "bin", "robust_mm", "rms_mm", "bias_mm", "slope", "fill", "within_three", "by_depth", "response"):
         assert np.array_equal(getattr(copied, name), getattr(fit, name), equal_nan=True), name
+    assert fit.findings == []
+    curved = [np.round(255 * (image / 255) ** (1 / 2.2)).astype(np.uint8) for image in slices[12:29]]
+    findings = farnear.calibrate_stack(curved, step_mm=0.05, pair_step=4, bin=1).findings
+    assert any("not linear in light" in finding for finding in findings), findings
     first = 20 - fit.pair_step // 2
     found = farnear.depth(slices[first], slices[first + fit.pair_step], fit.optics, method="whitened")
     # The target is in focus at slice 20: so many steps nearer than the far plane. Within a third of a step.
@@ -392,6 +422,12 @@ def test_a_processor_refuses_optics_that_were_learned_for_another_method(learned
         with pytest.raises(farnear.FarnearError, match="learned by calibrate stack for method whitened") as refused:
             use()
         assert "--" not in str(refused.value), "an option of the command line"
+
+
+def test_a_processor_refuses_optics_with_a_distortion(optics):
+    distortion = "[distortion]\ncamera_matrix = [[400, 0, 159.5], [0, 400, 119.5], [0, 0, 1]]\ncoefficients = [-0.3, 0.1, 0.0, 0.0]\n"
+    with pytest.raises(farnear.FarnearError, match="distortion.*use farnear.depth"):
+        farnear.Processor(farnear.Optics.loads(f"{optics.dumps()}\n{distortion}"))
 
 
 def test_optics_in_another_unit_are_a_finding(optics, slant):

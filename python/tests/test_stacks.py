@@ -60,3 +60,9 @@ def test_rounding_to_codes_is_not_sharpness(images):
     values = [image / np.float32(255) for image in codes]
     of_codes, of_values = (farnear.focus_stack(stack, use_all=True).reliability for stack in (codes, values))
     assert of_codes.mean() < of_values.mean()
+
+
+def test_a_map_with_few_depths_is_a_finding():
+    """The first image is the sharpest: the focus lies at the end of the stack, or beyond it."""
+    found = farnear.focus_stack([blurred(1 + 2 * index) for index in range(8)])
+    assert any("only 0 % of the picture has a depth" in finding for finding in found.findings), found.findings

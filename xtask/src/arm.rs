@@ -1,12 +1,12 @@
 //! Tests of the run time's vectors on 64-bit ARM (NEON) under qemu, if the tools are installed.
 
-use std::{fs, path::Path, process::Command};
+use std::{path::Path, process::Command};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 
 use crate::{
     run::{ROOT, cargo, has, has_target},
-    test_programs::{self, Total},
+    test_programs::{self, Total, written},
 };
 
 pub const TARGET: &str = "aarch64-unknown-linux-gnu";
@@ -65,20 +65,8 @@ fn links() -> bool {
 fn tests_of(module: &str) -> Result<u32> {
     let file = ROOT.join(format!("host/depth/src/{module}.rs"));
     let below = file.with_extension("");
-    Ok(written(&file)? + if below.is_dir() { written(&below)? } else { 0 })
-}
-
-fn written(place: &Path) -> Result<u32> {
-    let seen = || format!("cannot read {}", place.display());
-    if place.is_dir() {
-        let mut count = 0;
-        for entry in fs::read_dir(place).with_context(seen)? {
-            count += written(&entry.with_context(seen)?.path())?;
-        }
-        return Ok(count);
-    }
-    let text = fs::read_to_string(place).with_context(seen)?;
-    Ok(text.lines().filter(|line| line.trim() == "#[test]").count() as u32)
+    let count = |place: &Path| written(place, "#[test]");
+    Ok(count(&file)? + if below.is_dir() { count(&below)? } else { 0 })
 }
 
 #[cfg(test)]

@@ -2,15 +2,15 @@
 
 use std::{
     path::{Path, PathBuf},
-    process::{Command, Stdio},
+    process::Command,
 };
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 
 use crate::{
     limited,
-    run::{ROOT, target_folder},
-    test_programs::Total,
+    run::{ROOT, has, target_folder},
+    test_programs::{Total, written},
 };
 
 /// Used if `CHROMIUM` is not set.
@@ -22,11 +22,9 @@ const TESTS: [&str; 4] = ["page.test.mjs", "rows.test.mjs", "results.test.mjs", 
 pub fn run() -> Result<Total> {
     let folder = &ROOT.join("host/serve/tests-browser");
     if let Some(missing) = missing(folder) {
-        let read =
-            |name: &str| std::fs::read_to_string(folder.join(name)).context("the page's tests are not there");
-        let text = TESTS.into_iter().map(read).collect::<Result<String>>()?;
         eprintln!("skipped: the page in a browser ({missing})");
-        return Ok(Total { ignored: written(&text), well: true, ..Total::default() });
+        let ignored = TESTS.iter().map(|name| written(&folder.join(name), "test(")).sum::<Result<u32>>()?;
+        return Ok(Total { ignored, well: true, ..Total::default() });
     }
     let mut total = Total { well: true, ..Total::default() };
     // One by one: each has the time limit for itself, and is counted even if another one is killed.
@@ -53,8 +51,7 @@ pub fn run() -> Result<Total> {
 fn missing(folder: &Path) -> Option<&'static str> {
     let named = std::env::var_os("CHROMIUM").map(PathBuf::from);
     let browser = BROWSERS.into_iter().map(PathBuf::from).chain(named).any(|path| path.is_file());
-    let node = Command::new("node").arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
-    if !node.is_ok_and(|status| status.success()) {
+    if !has("node") {
         Some("node is missing; Debian's package is nodejs")
     } else if !["playwright-core", "typescript"]
         .iter()
@@ -68,11 +65,6 @@ fn missing(folder: &Path) -> Option<&'static str> {
     }
 }
 
-/// Tests in the file; those in the loop over sizes and schemes count once.
-fn written(text: &str) -> u32 {
-    text.lines().filter(|line| line.trim_start().starts_with("test(")).count() as u32
-}
-
 /// The number after "# pass " in the runner's output.
 fn number(text: &str, name: &str) -> u32 {
     let line =
@@ -82,12 +74,13 @@ fn number(text: &str, name: &str) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    use super::{number, written};
+    use super::{ROOT, TESTS, number, written};
 
     #[test]
     fn counts_are_read() {
         let text = "ok 1 - a\n# pass is a word\n# tests 14\n# pass 12\n# fail 1\n# skipped 1\n";
         assert_eq!([number(text, "pass"), number(text, "fail"), number(text, "skipped")], [12, 1, 1]);
-        assert_eq!(written("test(\"a\")\n  test(`b`)\nconst test = 1;\n"), 2);
+        let page = ROOT.join("host/serve/tests-browser").join(TESTS[0]);
+        assert!(written(&page, "test(").is_ok_and(|tests| tests > 5));
     }
 }

@@ -18,7 +18,7 @@ use crate::run::describe;
 /// The longest takes seven minutes on two busy cores.
 const LIMIT: Duration = Duration::from_secs(20 * 60);
 /// Time for the last output after a program's end.
-const LAST: Duration = Duration::from_secs(5);
+const LAST: Duration = Duration::from_secs(if cfg!(test) { 1 } else { 5 });
 const LOOK: Duration = Duration::from_millis(20);
 
 pub struct Output {
@@ -34,7 +34,7 @@ pub fn run(command: &mut Command) -> Result<Output> {
     Ok(finished)
 }
 
-fn run_for(command: &mut Command, limit: Duration) -> Result<Output> {
+pub fn run_for(command: &mut Command, limit: Duration) -> Result<Output> {
     let named = describe(command);
     let child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
     let mut child = child.with_context(|| format!("cannot start {named}"))?;

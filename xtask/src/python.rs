@@ -11,7 +11,7 @@ use anyhow::{Context, Result};
 use crate::{
     limited,
     run::{ROOT, cargo, features, finish, succeeds, target_folder},
-    test_programs::{self, Total},
+    test_programs::{self, Total, written},
 };
 
 /// Compiled only if Python is available.
@@ -44,7 +44,7 @@ pub fn run(elf: &Path) -> Result<Total> {
         Ok(python) => python,
         Err(missing) => {
             eprintln!("skipped: the Python package ({missing})");
-            return Ok(Total { ignored: written(&tests)?, well: true, ..Total::default() });
+            return Ok(Total { ignored: written(&tests, "def test_")?, well: true, ..Total::default() });
         }
     };
     let built = target_folder().join("debug");
@@ -133,21 +133,10 @@ fn lay_out(package: &Path, built: &Path) -> Result<()> {
     Ok(())
 }
 
-fn written(tests: &Path) -> Result<u32> {
-    let mut count = 0;
-    for entry in fs::read_dir(tests).context("the package's tests are not there")? {
-        let text = fs::read_to_string(entry?.path()).unwrap_or_default(); // folders of caches
-        count += text.lines().filter(|line| line.starts_with("def test_")).count() as u32;
-    }
-    Ok(count)
-}
-
 /// The number before a word in pytest's last line: "1 failed, 98 passed, 3 skipped in 8.34s".
 fn count(text: &str, word: &str) -> u32 {
     let last = text.lines().rev().find(|line| line.contains(" in ")).unwrap_or_default();
-    let parts = last.trim_matches(['=', ' ']).split(['(', ',']).flat_map(|part| part.split(" in "));
-    let number = |part: &str| part.trim().strip_suffix(word)?.trim().parse().ok();
-    parts.filter_map(number).next().unwrap_or(0)
+    test_programs::count(last, word)
 }
 
 #[cfg(test)]
@@ -160,6 +149,6 @@ mod tests {
         let words = ["failed", "passed", "skipped", "error"];
         assert_eq!(words.map(|word| count(text, word)), [1, 98, 3, 0]);
         assert_eq!(words.map(|word| count("== 5 passed in 75.00s (0:01:15) ==\n", word)), [0, 5, 0, 0]);
-        assert!(written(&ROOT.join("python/tests")).is_ok_and(|tests| tests > 20));
+        assert!(written(&ROOT.join("python/tests"), "def test_").is_ok_and(|tests| tests > 20));
     }
 }

@@ -232,17 +232,23 @@ impl Total {
 }
 
 /// The number before `word` in "ok. 12 passed; 0 failed; ...".
-fn count(counts: &str, word: &str) -> u32 {
-    let mut words = counts.split([' ', ';']).filter(|part| !part.is_empty());
-    let mut before = "";
-    words
-        .find_map(|part| {
-            let found = part == word;
-            let number = found.then(|| before.parse().ok()).flatten();
-            before = part;
-            number
-        })
-        .unwrap_or(0)
+pub fn count(counts: &str, word: &str) -> u32 {
+    let words = counts.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
+    let words: Vec<&str> = words.collect();
+    let before = words.windows(2).find(|pair| pair[1] == word).map(|pair| pair[0]);
+    before.and_then(|number| number.parse().ok()).unwrap_or(0)
+}
+
+/// Tests in a file, or in all files of a folder: lines that begin with `opening`. Tests in a loop count once.
+pub fn written(place: &Path, opening: &str) -> Result<u32> {
+    let seen = || format!("cannot read {}", place.display());
+    if place.is_dir() {
+        let entries = fs::read_dir(place).with_context(seen)?;
+        return entries.map(|entry| written(&entry.with_context(seen)?.path(), opening)).sum();
+    }
+    let bytes = fs::read(place).with_context(seen)?;
+    let text = String::from_utf8_lossy(&bytes);
+    Ok(text.lines().filter(|line| line.trim_start().starts_with(opening)).count() as u32)
 }
 
 #[cfg(test)]

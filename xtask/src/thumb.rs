@@ -5,12 +5,15 @@ use std::{
     fmt,
     path::{Path, PathBuf},
     process::{Command, Stdio},
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 use anyhow::{Result, bail};
 
-use crate::run::{finish, has, has_target, output, step, succeeds};
+use crate::{
+    limited,
+    run::{finish, has, has_target, output, step, succeeds},
+};
 
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
@@ -99,20 +102,11 @@ fn rustup_adds_target() -> bool {
         return false;
     }
     step(&format!("rustup target add {TARGET}"));
-    let Ok(mut child) = Command::new("rustup").args(["target", "add", TARGET]).spawn() else {
-        return false;
-    };
-    let deadline = Instant::now() + Duration::from_secs(120);
-    while Instant::now() < deadline {
-        match child.try_wait() {
-            Ok(Some(status)) if status.success() => return has_target(TARGET),
-            Ok(None) => std::thread::sleep(Duration::from_millis(100)),
-            _ => break,
-        }
+    let mut add = Command::new("rustup");
+    add.args(["target", "add", TARGET]);
+    if limited::run_for(&mut add, Duration::from_secs(120)).is_ok_and(|ended| ended.well) {
+        return has_target(TARGET);
     }
-    // Fails harmlessly if the child has ended.
-    let _ = child.kill();
-    let _ = child.wait();
     eprintln!("rustup cannot fetch the target here; trying Debian's packages");
     false
 }

@@ -2,7 +2,6 @@
 //! receive [`IN_USE`]. Each frame is sent once; frames left by a client are dropped, and its free run ends.
 
 use std::{
-    cell::Cell,
     collections::VecDeque,
     io::{Read, Write},
     net::{Ipv4Addr, Shutdown, SocketAddr, TcpListener, TcpStream},
@@ -27,16 +26,24 @@ const CONTROL_MAX: u32 = 64;
 /// Grace period in which a client that just disconnected may still appear connected.
 const FAREWELL: Duration = Duration::from_millis(500);
 
+struct Client {
+    /// Tells clients apart: after a reset the system no longer reports the peer.
+    number: u64,
+    stream: TcpStream,
+    /// It has started a free run and not ended it.
+    runs_freely: bool,
+}
+
 #[derive(Default)]
 struct State {
     frames: VecDeque<Vec<u8>>,
-    /// The client with an id: after a reset the system no longer reports the peer.
-    client: Option<(u64, TcpStream)>,
+    client: Option<Client>,
 }
 
 struct Endpoint {
     state: Mutex<State>,
     changed: Condvar,
+    control: Box<dyn Fn(Control) + Send + Sync>,
     left: Box<dyn Fn() + Send + Sync>,
 }
 
@@ -49,7 +56,7 @@ fn lock(shared: &Shared) -> std::sync::MutexGuard<'_, State> {
 /// Opens a free loopback port. `frames` go to the client, its messages to `control`; then calls `left`.
 pub fn open(
     frames: Receiver<Vec<u8>>,
-    control: impl Fn(Control) + Send + Clone + 'static,
+    control: impl Fn(Control) + Send + Sync + 'static,
     left: impl Fn() + Send + Sync + 'static,
 ) -> Result<SocketAddr, SimError> {
     let io = |what: &str| {
@@ -59,20 +66,24 @@ pub fn open(
     let listener =
         TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).map_err(io("cannot open the camera endpoint"))?;
     let address = listener.local_addr().map_err(io("cannot open the camera endpoint"))?;
-    let shared: Shared =
-        Arc::new(Endpoint { state: Mutex::default(), changed: Condvar::new(), left: Box::new(left) });
+    let shared: Shared = Arc::new(Endpoint {
+        state: Mutex::default(),
+        changed: Condvar::new(),
+        control: Box::new(control),
+        left: Box::new(left),
+    });
     let spawn = |name: &str, work: Box<dyn FnOnce() + Send>| {
         thread::Builder::new().name(name.into()).spawn(work).map_err(io("cannot start a thread"))
     };
     let state = shared.clone();
-    spawn("camera clients", Box::new(move || accept(&listener, &state, &control)))?;
+    spawn("camera clients", Box::new(move || accept(&listener, &state)))?;
     let state = shared.clone();
     spawn("camera frames", Box::new(move || keep(frames, &state)))?;
     spawn("camera sender", Box::new(move || send(&shared)))?;
     Ok(address)
 }
 
-fn accept(listener: &TcpListener, shared: &Shared, control: &(impl Fn(Control) + Send + Clone + 'static)) {
+fn accept(listener: &TcpListener, shared: &Shared) {
     for (number, stream) in (0..).zip(listener.incoming()) {
         let Ok(stream) = stream else { continue };
         let (Ok(reader), Ok(())) = (stream.try_clone(), stream.set_nodelay(true)) else { continue };
@@ -84,23 +95,13 @@ fn accept(listener: &TcpListener, shared: &Shared, control: &(impl Fn(Control) +
             refuse(stream);
             continue;
         }
-        state.client = Some((number, stream));
+        state.client = Some(Client { number, stream, runs_freely: false });
         drop(state);
         shared.changed.notify_all();
-        let (control, shared) = (control.clone(), shared.clone());
+        let shared = shared.clone();
         // Without a reader thread the client still gets its frames.
         let _ = thread::Builder::new().name("camera control".into()).spawn(move || {
-            let runs_freely = Cell::new(false);
-            listen(reader, &|message| {
-                if let Control::FreeRun { period, .. } = message {
-                    runs_freely.set(period.0 > 0);
-                }
-                control(message);
-            });
-            // As a GigE Vision camera without heartbeat; one that runs freely ignores triggers.
-            if runs_freely.get() {
-                control(Control::FreeRun { period: Micros(0), exposure: Micros(0) });
-            }
+            listen(reader, &|message| obey(&shared, number, message));
             forget(&shared, number);
         });
     }
@@ -111,12 +112,27 @@ fn refuse(mut stream: TcpStream) {
     let _ = stream.shutdown(Shutdown::Both);
 }
 
+/// Ignores a client that is forgotten: some of its messages may still wait to be read.
+fn obey(shared: &Shared, number: u64, message: Control) {
+    let mut state = lock(shared);
+    let Some(client) = state.client.as_mut().filter(|client| client.number == number) else { return };
+    if let Control::FreeRun { period, .. } = message {
+        client.runs_freely = period.0 > 0;
+    }
+    (shared.control)(message);
+}
+
+/// Ends the client's free run before another client may start one.
 fn forget(shared: &Shared, gone: u64) {
     let mut state = lock(shared);
-    if let Some((_, stream)) = state.client.take_if(|(number, _)| *number == gone) {
+    if let Some(client) = state.client.take_if(|client| client.number == gone) {
         state.frames.clear();
+        // As a GigE Vision camera without heartbeat; one that runs freely ignores triggers.
+        if client.runs_freely {
+            (shared.control)(Control::FreeRun { period: Micros(0), exposure: Micros(0) });
+        }
         (shared.left)();
-        let _ = stream.shutdown(Shutdown::Both); // a client may wait for this
+        let _ = client.stream.shutdown(Shutdown::Both); // a client may wait for this
         shared.changed.notify_all();
     }
 }
@@ -164,7 +180,7 @@ fn send(shared: &Shared) {
         }
         let frame = state.frames.pop_front();
         shared.changed.notify_all();
-        let client = state.client.as_ref().map(|(number, client)| (*number, client.try_clone()));
+        let client = state.client.as_ref().map(|client| (client.number, client.stream.try_clone()));
         drop(state);
         let (Some(frame), Some((number, Ok(mut client)))) = (frame, client) else { continue };
         if client.write_all(&frame).is_err() {
@@ -253,5 +269,33 @@ mod tests {
         tell(&mut connect(address), Control::AdvanceMicros(1));
         let rest: Vec<_> = (0..3).map(|_| hear.recv_timeout(LONG)).collect();
         assert_eq!(rest, [Ok(run(40_000)), Ok(run(0)), Ok(Control::AdvanceMicros(1))]);
+    }
+
+    #[test]
+    fn the_free_run_of_a_forgotten_client_ends_before_the_next_one_begins() {
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("loopback");
+        let address = listener.local_addr().expect("a socket");
+        let (heard, hear) = mpsc::channel();
+        let control = move |message: Control| {
+            let _ = heard.send(message); // the receiver may have gone
+        };
+        let shared: Shared = Arc::new(Endpoint {
+            state: Mutex::default(),
+            changed: Condvar::new(),
+            control: Box::new(control),
+            left: Box::new(|| {}),
+        });
+        let accepting = shared.clone();
+        thread::spawn(move || accept(&listener, &accepting));
+        let run = |period| Control::FreeRun { period: Micros(period), exposure: Micros(5_000) };
+        let mut first = connect(address);
+        tell(&mut first, run(40_000));
+        assert_eq!(hear.recv_timeout(LONG), Ok(run(40_000)));
+        // The sender has noticed before the reader that the client is gone.
+        forget(&shared, 0);
+        let end = hear.try_recv();
+        assert!(matches!(end, Ok(Control::FreeRun { period: Micros(0), .. })), "{end:?}");
+        tell(&mut connect(address), run(50_000));
+        assert_eq!(hear.recv_timeout(LONG), Ok(run(50_000)));
     }
 }

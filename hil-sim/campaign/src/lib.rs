@@ -36,14 +36,13 @@ impl FromStr for Shard {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong =
-            || format!("{text:?} is not a shard: expected INDEX/COUNT, e.g. 2/8 for the second of eight");
-        let (index, count) = text.split_once('/').ok_or_else(wrong)?;
-        let (index, count) = (index.parse().map_err(|_| wrong())?, count.parse().map_err(|_| wrong())?);
-        if index == 0 || index > count {
-            return Err(wrong());
+        let parts = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+        match parts {
+            Some((index, count)) if (1..=count).contains(&index) => Ok(Self { index, count }),
+            _ => Err(format!(
+                "{text:?} is not a shard: expected INDEX/COUNT, e.g. 2/8 for the second of eight"
+            )),
         }
-        Ok(Self { index, count })
     }
 }
 

@@ -20,8 +20,9 @@ use crate::{
     control::{Ask, Command},
     description::CHUNKS,
     features::{
-        ACQUISITION, BLACK_LEVEL, CHUNK_MODE, EXPOSURE_US, FRAME_RATE, GAIN, HEIGHT, MONO_8, OFFSET_X,
-        OFFSET_Y, PIXEL_FORMAT, SOFTWARE, START, STOP, TRIGGER_MODE, TRIGGER_SOFTWARE, TRIGGER_SOURCE, WIDTH,
+        ACQUISITION, BLACK_LEVEL, CHUNK_ENABLE, CHUNK_MODE, EXPOSURE_US, FRAME_RATE, GAIN, HEIGHT, MONO_8,
+        OFFSET_X, OFFSET_Y, PIXEL_FORMAT, SOFTWARE, START, STOP, TRIGGER_MODE, TRIGGER_SOFTWARE,
+        TRIGGER_SOURCE, WIDTH,
     },
     registers::{
         FIRE_TEST, HEARTBEAT_MS, PACKET_DELAY_NS, PACKET_SIZE, PRIVILEGE, PRIVILEGE_CONTROL, Refusal,
@@ -38,7 +39,8 @@ const PACKET_BYTES: u32 = 0xFFFF;
 /// Minimum time between free-running exposures: read-out and a margin.
 pub(super) const BETWEEN_EXPOSURES_US: u32 = 15_000;
 /// Features that may not change during an acquisition, because they change the size of a frame.
-const LOCKED: [u32; 5] = [OFFSET_X, OFFSET_Y, WIDTH, HEIGHT, PIXEL_FORMAT];
+const LOCKED: [u32; 8] =
+    [OFFSET_X, OFFSET_Y, WIDTH, HEIGHT, PIXEL_FORMAT, CHUNK_MODE, CHUNK_ENABLE, CHUNK_ENABLE + 4];
 /// First id of software-triggered pictures, far from the board's numbers.
 const SOFTWARE_SHOTS: u32 = 0x4000_0000;
 
@@ -364,7 +366,8 @@ mod tests {
     fn the_size_of_a_frame_is_locked_during_an_acquisition() {
         let mut client = Client::new();
         assert!(client.write(ACQUISITION, START).is_ok());
-        for (register, value) in [(WIDTH, 320), (HEIGHT, 240), (OFFSET_X, 0), (PIXEL_FORMAT, MONO_8)] {
+        let size = [(WIDTH, 320), (HEIGHT, 240), (OFFSET_X, 0), (PIXEL_FORMAT, MONO_8)];
+        for (register, value) in size.into_iter().chain([(CHUNK_MODE, 1), (CHUNK_ENABLE + 4, 1)]) {
             assert_eq!(client.write(register, value), Err(Refusal::WriteProtect), "{register:x}");
         }
         assert!(client.write(ACQUISITION, STOP).is_ok());

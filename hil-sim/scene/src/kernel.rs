@@ -273,9 +273,12 @@ mod tests {
         ] {
             let profile = Profile { p, sigma };
             let reach = profile.radius_at(26.0).ceil() as i32 + 2;
-            let sum: f64 = (-reach..=reach)
-                .flat_map(|x| (-reach..=reach).map(move |y| (f64::from(x).abs(), f64::from(y).abs())))
-                .map(|(x, y)| profile_weight(x.max(y), x.min(y), profile))
+            let octant = (0..=reach).flat_map(|x| (0..=x).map(move |y| (x, y)));
+            let sum: f64 = octant
+                .map(|(x, y)| {
+                    let mirrors = [x > 0, y > 0, x != y].into_iter().filter(|mirrored| *mirrored).count();
+                    f64::from(1_i32 << mirrors) * profile_weight(f64::from(x), f64::from(y), profile)
+                })
                 .sum();
             assert!((sum - 1.0).abs() < 1e-6, "p {p} sigma {sigma}: {sum}");
         }

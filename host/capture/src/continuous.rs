@@ -16,7 +16,7 @@ use crate::{
     camera::{Camera, CameraError, Image},
     client::Client,
     error::ClientError,
-    expose::{CaptureError, check_exposures, expose_first, one_trigger, wait_for_image},
+    expose::{CaptureError, Format, check_exposures, expose_first, one_trigger, wait_for_image},
     work::{Step, Work},
 };
 
@@ -78,6 +78,7 @@ pub struct Continuous<'c> {
     next: u32,
     reported: VecDeque<Reported>,
     undelivered: u32,
+    format: Format,
 }
 
 impl<'c> Continuous<'c> {
@@ -108,8 +109,18 @@ impl<'c> Continuous<'c> {
         }
         let work = Some(client.start_continuous(shots, pace.period, pace.exposures)?);
         let client = client.clone();
-        let reported = VecDeque::new();
-        Ok(Self { client, camera, work, mode, exposure, image_wait, next: 0, reported, undelivered: 0 })
+        Ok(Self {
+            client,
+            camera,
+            work,
+            mode,
+            exposure,
+            image_wait,
+            next: 0,
+            reported: VecDeque::new(),
+            undelivered: 0,
+            format: Format::default(),
+        })
     }
 
     /// Number of reported frames not yet read; callers that fall behind may skip some.
@@ -196,6 +207,7 @@ impl<'c> Continuous<'c> {
         match wait_for_image(&self.client, self.camera, &record, self.image_wait) {
             Ok(image) => {
                 self.undelivered = 0;
+                self.format.check(&image, record.trigger_number)?;
                 Ok(Outcome::Taken(Box::new(Frame { number, deviation, record, image })))
             }
             Err(CaptureError::Camera(

@@ -40,6 +40,19 @@ pub enum CaptureError {
         near_height: usize,
         near_bits: u8,
     },
+    #[error(
+        "the image of exposure {trigger_number} has {width}x{height} pixels of {bits} bits, expected {first_width}x{first_height} of \
+         {first_bits} as before: let nothing change the camera's size or format during a program"
+    )]
+    Reformatted {
+        trigger_number: u32,
+        width: usize,
+        height: usize,
+        bits: u8,
+        first_width: usize,
+        first_height: usize,
+        first_bits: u8,
+    },
     #[error("the board reported {reported} exposures, {asked} were requested")]
     Count { reported: usize, asked: usize },
     #[error(
@@ -116,6 +129,30 @@ fn of_camera(at: usize, count: usize) -> impl Fn(CameraError) -> CaptureError {
     }
 }
 
+/// Size and bits of a camera's images, which stay the same during a program.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Format(Option<((usize, usize), u8)>);
+
+impl Format {
+    /// Fails for an image unlike the first one.
+    pub(crate) fn check(&mut self, image: &Image, trigger_number: u32) -> Result<(), CaptureError> {
+        let now @ ((height, width), bits) = (image.pixels.dim(), image.bits);
+        let first @ ((first_height, first_width), first_bits) = *self.0.get_or_insert(now);
+        match now == first {
+            true => Ok(()),
+            false => Err(CaptureError::Reformatted {
+                trigger_number,
+                width,
+                height,
+                bits,
+                first_width,
+                first_height,
+                first_bits,
+            }),
+        }
+    }
+}
+
 /// Arms the cameras for `work`.
 fn with_armed<E: From<CaptureError>>(
     cameras: &mut [&mut dyn Camera],
@@ -153,6 +190,7 @@ fn run_armed<E: From<CaptureError> + From<ClientError>>(
     mut on_image: impl FnMut(usize, ShotRecord, Image) -> Result<(), E>,
 ) -> Result<(), E> {
     let count = cameras.len();
+    let mut formats = vec![Format::default(); count];
     let mut reported = 0;
     run_program(client, shots, |kind, received| -> Result<(), E> {
         match kind {
@@ -163,13 +201,14 @@ fn run_armed<E: From<CaptureError> + From<ClientError>>(
             }
             EventKind::ShotDone { shot, .. } => {
                 reported += 1;
-                for (at, camera) in cameras.iter_mut().enumerate() {
+                for ((at, camera), format) in cameras.iter_mut().enumerate().zip(&mut formats) {
                     camera.reported(shot, received);
                     let image = wait_for_image(client, &mut **camera, shot, image_wait);
                     let image = image.map_err(|error| match error {
                         CaptureError::Camera(source) => of_camera(at, count)(source),
                         other => other,
                     })?;
+                    format.check(&image, shot.trigger_number)?;
                     on_image(at, *shot, image)?;
                 }
             }

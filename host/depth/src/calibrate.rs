@@ -175,9 +175,13 @@ impl fmt::Display for Verdict {
 }
 
 impl PsfFit {
-    /// The width as a `k`: that of a Gaussian of the same second moment.
+    /// The width as the `k` that [`Self::standard_error_k`] is of: the parameter of a Gaussian or generalised Gaussian, of any
+    /// other PSF that of a Gaussian of the same second moment.
     pub fn width(&self) -> f64 {
-        (0.5 * self.psf.second_moment()).sqrt()
+        match self.psf {
+            Psf::Gaussian { k } | Psf::Generalised { k, .. } => k,
+            Psf::PillBox | Psf::Ring { .. } | Psf::Radial(_) => (0.5 * self.psf.second_moment()).sqrt(),
+        }
     }
 
     /// Quality of the calibration.
@@ -294,5 +298,24 @@ mod tests {
             near_height: 3,
         };
         assert!(sizes.to_string().starts_with("pair 2: the far image is 4x3"), "{sizes}");
+    }
+
+    /// At p = 1 the Gaussian of the same second moment has 1.73 k: half of 6 k^2.
+    #[test]
+    fn the_width_of_a_generalised_gaussian_is_the_parameter_whose_error_is_stated() {
+        let fit = |psf, error| PsfFit {
+            psf,
+            residual: 0.0,
+            noise: 0.0,
+            standard_error_p: None,
+            standard_error_k: Some(error),
+            otf: Vec::new(),
+            alphas: Vec::new(),
+        };
+        let found = |error| fit(Psf::Generalised { p: 1.0, k: 0.4 }, error);
+        assert_eq!(found(0.0055).width(), 0.4);
+        assert_eq!(found(0.0055).verdict(), Verdict::Loose, "1.4 % of k");
+        assert_eq!(found(0.0039).verdict(), Verdict::Good);
+        assert_eq!(fit(Psf::PillBox, 0.0).width(), 0.5);
     }
 }

@@ -326,9 +326,10 @@ pub(crate) fn measure(
         undo_scaled_blur(&mut map.depth_mm, aligned.magnification, optics);
         if optics.stage().is_none() {
             let moments = (SCALED_BLUR_ERROR * (1.0 - aligned.magnification.powi(-2)).abs()) as f32;
-            let of_model = moments * optics.depth_per_alpha_mm(0.0).abs() as f32;
-            let of_model = of_model * of_model;
-            estimate.deviation_mm.par_mapv_inplace(|deviation| (deviation * deviation + of_model).sqrt());
+            let slope_mm = slope_mm(optics);
+            Zip::from(&mut estimate.deviation_mm)
+                .and(&map.depth_mm)
+                .par_for_each(|deviation, depth| *deviation = deviation.hypot(moments * slope_mm(*depth)));
         }
     }
     if let (DepthMethod::Whitened, Some(stage)) = (method, optics.stage()) {
@@ -336,6 +337,12 @@ pub(crate) fn measure(
         map.warnings.extend(warning);
     }
     Ok((map, estimate))
+}
+
+/// Magnitude of the change of depth with alpha at a depth, mm.
+fn slope_mm(optics: &Optics) -> impl Fn(f32) -> f32 + Copy + Sync {
+    let (steepness, focal_length_mm) = (optics.steepness() as f32, optics.focal_length_mm() as f32);
+    move |depth_mm| steepness * (depth_mm - focal_length_mm).powi(2)
 }
 
 /// Whether the texture of most pixels is unlike the learned ones, from `low` to `high`; not if noise hides it everywhere.
@@ -361,14 +368,15 @@ fn respond(
 ) -> Option<Warning> {
     let is_used = stage.coarser.is_some() || stage.coarseness.is_some();
     let coarseness = is_used.then(|| coarseness(pair));
-    let per_alpha_mm = optics.depth_per_alpha_mm(0.0).abs() as f32;
     Zip::indexed(depth_mm).and(deviation_mm).par_for_each(|at, depth, deviation| {
         let measured = optics.alpha(f64::from(*depth));
         let coarseness = coarseness.as_ref().map_or(f64::NAN, |map| f64::from(map[at]));
         match stage.respond(measured, coarseness) {
             Some([alpha, slope, of_texture]) => {
                 *depth = optics.depth_mm(alpha) as f32;
-                *deviation = (*deviation * slope as f32).hypot(of_texture as f32 * per_alpha_mm);
+                let [before, now] = [measured, alpha].map(|alpha| optics.depth_per_alpha_mm(alpha).abs());
+                let of_alpha = f64::from(*deviation) / before * slope;
+                *deviation = (of_alpha.hypot(of_texture) * now) as f32;
             }
             None if measured.is_finite() => {
                 *depth = optics.depth_mm(OUT_OF_RANGE_ALPHA.copysign(measured)) as f32;
@@ -401,16 +409,16 @@ fn of_estimate(
     optics: &Optics,
     settings: &MeasureSettings,
 ) -> DepthMap {
-    let unit = (0.05 * optics.depth_per_alpha_mm(0.0).abs()) as f32;
-    // Evidence is the reciprocal variance, like texture energy in the run time.
-    let evidence = settings.run.fill.then(|| deviation_mm.mapv(|deviation| (unit / deviation).powi(2)));
+    let slope_mm = slope_mm(optics);
+    // Evidence is the reciprocal variance of alpha, like texture energy in the run time.
+    let of = |depth: f32, deviation: f32| (0.05 * slope_mm(depth) / deviation).powi(2);
     let mut confidence = Array2::zeros(deviation_mm.dim());
-    let backend = settings.run.backend.unwrap_or_else(Backend::best);
-    Zip::from(confidence.rows_mut()).and(deviation_mm.rows()).par_for_each(|mut to, from| {
-        let (Some(to), Some(from)) = (to.as_slice_mut(), from.as_slice()) else {
-            unreachable!("maps are made in standard layout")
-        };
-        simd::evidence_row(backend, unit, from, to);
+    Zip::from(&mut confidence).and(&depth_mm).and(deviation_mm).par_for_each(|to, depth, deviation| {
+        let evidence = of(*depth, *deviation);
+        *to = if evidence < f32::INFINITY { evidence / (1.0 + evidence) } else { 0.0 };
+    });
+    let evidence = settings.run.fill.then(|| {
+        Zip::from(&depth_mm).and(deviation_mm).map_collect(|depth, deviation| of(*depth, *deviation))
     });
     let mut map =
         DepthMap { depth_mm, confidence, filled: None, low_texture_fraction: 0.0, warnings: Vec::new() };

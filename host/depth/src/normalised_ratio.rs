@@ -83,7 +83,8 @@ pub fn smallest_slope(otf: &Otf, max_blur_px: f64, w: f64) -> f64 {
     smallest
 }
 
-/// First radial frequency (rad/px, to 1e-6) at which the NIR does not rise over all alpha in [-1, 1]; infinite if none.
+/// First radial frequency (rad/px, to 1 %, because alpha is sampled) at which the NIR does not rise over all alpha in [-1, 1];
+/// infinite if none.
 pub fn first_non_monotonic(otf: &Otf, max_blur_px: f64) -> f64 {
     let falls = |w: f64| smallest_slope(otf, max_blur_px, w) <= 0.0;
     const STEPS: usize = 400;
@@ -197,7 +198,7 @@ mod tests {
     #[test]
     fn only_the_pill_box_has_a_non_monotonic_frequency() {
         let limit = first_non_monotonic(&Psf::PillBox.otf(RMAX), RMAX);
-        // Above the first zero of the largest blur's OTF and below its first minimum (z = 5.136).
+        // Above the first zero of the largest blur's OTF and about its first minimum (z = 5.136).
         assert!(limit * RMAX > 3.8 && limit * RMAX < 5.2, "{limit}");
         assert_eq!(first_non_monotonic(&Psf::Gaussian { k: 0.3 }.otf(RMAX), RMAX), f64::INFINITY);
     }

@@ -119,6 +119,24 @@ impl Optics {
         Self { stage: Some(stage), ..self }
     }
 
+    /// Centre of projection before the lens and its principal distance, mm: a pixel of pitch p sees `p (z - centre) / distance` of
+    /// the object at depth z. Rays of a lens that is telecentric on the image side meet in its front focus, those through an
+    /// aperture at the lens in the lens. For the latter the distance is that of the far image's sensor: alignment scales the near
+    /// image to it.
+    pub fn projection_mm(&self) -> [f64; 2] {
+        let focal_length_mm = self.focal_length_mm;
+        match self.telecentric {
+            Some(false) => [0.0, focal_length_mm * self.far_mm / (self.far_mm - focal_length_mm)],
+            Some(true) | None => [focal_length_mm; 2],
+        }
+    }
+
+    /// Side of a pixel at the object at `depth_mm`, mm.
+    pub fn pixel_at_object_mm(&self, depth_mm: f64) -> f64 {
+        let [centre_mm, distance_mm] = self.projection_mm();
+        self.pixel_um * 1e-3 * (depth_mm - centre_mm) / distance_mm
+    }
+
     /// Magnification of the near relative to the far image without telecentricity: the ratio of the sensor distances.
     pub fn magnification_ratio(&self) -> f64 {
         let range = self.working_range();
@@ -211,6 +229,12 @@ impl Optics {
         -self.focal_length_mm * self.focal_length_mm * slope / (w * w)
     }
 
+    /// Magnitude of that slope relative to the square of the distance beyond the focal length, which it is proportional to, 1/mm.
+    pub fn steepness(&self) -> f64 {
+        let [_, slope] = self.defocus_line_mm();
+        slope.abs() / self.focal_length_mm.powi(2)
+    }
+
     /// Signed blur radii `[R1, R2]` in pixels at `alpha`, linear beyond the working range (an OTF takes the magnitude).
     pub fn blur_px(&self, alpha: f64) -> [f64; 2] {
         [0.5 * (1.0 + alpha) * self.max_blur_px, 0.5 * (1.0 - alpha) * self.max_blur_px]
@@ -239,6 +263,18 @@ mod tests {
 
     pub(super) fn rig() -> OpticsFile {
         toml::from_str(RIG).unwrap()
+    }
+
+    #[test]
+    fn chief_rays_meet_in_the_front_focus_or_in_the_lens() {
+        let mut file = rig();
+        let pixel_mm = |file: &OpticsFile, depth_mm| file.check().unwrap().pixel_at_object_mm(depth_mm);
+        assert!((pixel_mm(&file, 890.0) - 7.4e-3 * 840.0 / 50.0).abs() < 1e-9);
+        let telecentric = pixel_mm(&file, 933.0);
+        file.lens.telecentric = Some(false);
+        // The image of the far focus is equally large; its sensor is 52.8313 mm behind the lens.
+        assert!((pixel_mm(&file, 933.0) - telecentric).abs() < 1e-9);
+        assert!((pixel_mm(&file, 890.0) - 7.4e-3 * 890.0 / 52.8313).abs() < 1e-6);
     }
 
     #[test]

@@ -35,7 +35,7 @@ pub(crate) use rows::{
 };
 pub(crate) use windows::{
     Believed, CubicSums, Deviation, Found, MAX_LANES, OfNoise, Residual, add_products, add_row, believe_row,
-    deviation_row, dimensionless_row, evidence_row, move_products, residual_row, roots, row_sums, sum_rows,
+    deviation_row, dimensionless_row, move_products, residual_row, roots, row_sums, sum_rows,
 };
 
 /// Calls the generic function inside one with the backend's instructions enabled, so that it is compiled with them.

@@ -79,8 +79,7 @@ pub fn assess(
     let backend = Backend::best();
     let stage =
         optics.stage().map(|stage| [stage.residual, stage.usual_unexplained].map(|value| value as f32));
-    let of_model =
-        MODEL_ERROR.powi(2) * (left_over as f32 - USUAL_LEFT_OVER).max(0.0) * range.slope_mm.powi(2);
+    let of_model = MODEL_ERROR.powi(2) * (left_over as f32 - USUAL_LEFT_OVER).max(0.0);
     let of_coding = match prepared.noise {
         PairNoise { coding, mean_variance, .. } if coding > 0.0 => {
             CODING_ERROR * ((coding / mean_variance * noise_part) as f32).sqrt()
@@ -96,30 +95,33 @@ pub fn assess(
         .and(misfit.rows())
         .and(reasons.rows_mut())
         .par_for_each(|y, mut depth, mut confidence, mut deviation, misfit, mut reasons| {
-            let measured = filled.is_some().then(|| (depth.to_owned(), confidence.to_owned()));
-            let noise = deviation.to_vec();
-            let mut misfit = misfit.to_vec();
-            for ((deviation, noise), misfit) in deviation.iter_mut().zip(&noise).zip(&mut misfit) {
-                *deviation = match stage {
-                    Some([residual, usual]) => {
-                        // Relative to the target that the lens was learned from.
-                        *misfit = unexplained(*misfit, noise / range.slope_mm) / usual;
-                        noise.hypot(model_error(residual, *misfit) * range.slope_mm)
-                    }
-                    None => (noise * noise * misfit.max(1.0) + of_model).sqrt(),
-                };
-            }
-            if of_coding > 0.0 {
-                for (deviation, depth) in deviation.iter_mut().zip(&depth) {
-                    *deviation = deviation.hypot(of_coding * (depth - middle_mm));
-                }
-            }
             let rows = [&mut depth, &mut confidence, &mut deviation].map(|row| row.as_slice_mut());
             let ([Some(depth), Some(confidence), Some(deviation)], Some(reasons)) =
                 (rows, reasons.as_slice_mut())
             else {
                 unreachable!("maps are made in standard layout")
             };
+            let measured = filled.is_some().then(|| (depth.to_vec(), confidence.to_vec()));
+            let noise = deviation.to_vec();
+            let mut misfit = misfit.to_vec();
+            for (((deviation, noise), misfit), depth) in
+                deviation.iter_mut().zip(&noise).zip(&mut misfit).zip(&*depth)
+            {
+                let slope_mm = range.slope_mm(*depth);
+                *deviation = match stage {
+                    Some([residual, usual]) => {
+                        // Relative to the target that the lens was learned from.
+                        *misfit = unexplained(*misfit, noise / slope_mm) / usual;
+                        noise.hypot(model_error(residual, *misfit) * slope_mm)
+                    }
+                    None => (noise * noise * misfit.max(1.0) + of_model * slope_mm * slope_mm).sqrt(),
+                };
+            }
+            if of_coding > 0.0 {
+                for (deviation, depth) in deviation.iter_mut().zip(&*depth) {
+                    *deviation = deviation.hypot(of_coding * (depth - middle_mm));
+                }
+            }
             simd::believe_row(
                 backend,
                 range,
@@ -133,7 +135,7 @@ pub fn assess(
                 for (x, _) in filled.row(y).iter().enumerate().filter(|(_, filled)| **filled) {
                     if depths[x].is_finite() {
                         (depth[x], confidence[x], reasons[x]) = (depths[x], confidences[x], 0);
-                        deviation[x] = FILLED_DEVIATION * range.slope_mm;
+                        deviation[x] = FILLED_DEVIATION * range.slope_mm(depth[x]);
                     }
                 }
             }
@@ -175,7 +177,8 @@ fn range(optics: &Optics) -> Believed {
     Believed {
         far_mm,
         near_mm,
-        slope_mm: optics.depth_per_alpha_mm(0.0).abs() as f32,
+        focal_length_mm: optics.focal_length_mm() as f32,
+        steepness: optics.steepness() as f32,
         largest_deviation: LARGEST_DEVIATION,
         // A learned deviation includes the model's error.
         largest_misfit: if optics.stage().is_some() { f32::INFINITY } else { LARGEST_MISFIT },

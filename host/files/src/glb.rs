@@ -87,7 +87,7 @@ mod tests {
     use super::*;
     use ndarray::array;
 
-    const LENS: Projection = Projection { focal_length_mm: 50.0, pixel_um: 7.4, axis_px: None };
+    const LENS: Projection = Projection { centre_mm: 50.0, distance_mm: 50.0, pixel_um: 7.4, axis_px: None };
 
     /// The JSON chunk and the binary chunk, by the lengths in the headers.
     fn chunks(glb: &[u8]) -> (String, &[u8]) {

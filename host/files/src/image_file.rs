@@ -2,7 +2,7 @@
 //!
 //! | format | supported |
 //! |---|---|
-//! | PNG, BMP, PBM/PGM/PPM/PAM | all that `image` reads |
+//! | PNG, BMP, PBM/PGM/PPM/PAM | all that `image` reads, apart from PAM of 16 bits without TUPLTYPE |
 //! | JPEG | complete files only (`zune-jpeg`, strict mode) |
 //! | TIFF, BigTIFF | 1 to 16-bit and 32-bit integers, 16 to 64-bit float, grey, RGB and palettes of up to 8 bits (ImageJ: their numbers, without the colours), planar or not, strips or tiles (planes in padded tiles are refused) |
 //!

@@ -14,7 +14,10 @@ use tiff::{
 
 use crate::{
     EncodeError,
-    image_file::{self, ImageError, ReadSettings, Signed, tiff_tags},
+    image_file::{
+        self, ImageError, ReadSettings, Signed,
+        tiff_tags::{self, Directory},
+    },
     npy::{self, NpyError},
 };
 
@@ -73,8 +76,13 @@ pub fn read_with_nodata(path: &Path) -> Result<(Array2<f32>, Option<NoData>), Ma
     if image.colour {
         return Err(MapError::Colours { path: path.into() });
     }
+    let directory = directory(&bytes, page).unwrap_or_default();
+    if is_scaled(&directory) {
+        let reason = "GDAL's metadata scale or shift its values: store the depths themselves (`gdal_translate -unscale -ot Float32`)";
+        return Err(refused(reason.into()));
+    }
     let mut values = image.pixels;
-    let Some(value) = nodata(&bytes, page) else { return Ok((values, None)) };
+    let Some(value) = nodata(&directory) else { return Ok((values, None)) };
     let mut pixels = 0;
     values.iter_mut().filter(|pixel| **pixel == value).for_each(|pixel| {
         *pixel = f32::NAN;
@@ -83,11 +91,25 @@ pub fn read_with_nodata(path: &Path) -> Result<(Array2<f32>, Option<NoData>), Ma
     Ok((values, (pixels > 0).then_some(NoData { value, pixels })))
 }
 
-fn nodata(tiff: &[u8], page: Option<usize>) -> Option<f32> {
+fn nodata(directory: &Directory) -> Option<f32> {
+    directory.nodata.as_deref()?.trim().parse::<f64>().ok().map(|value| value as f32)
+}
+
+/// Whether GDAL's metadata have a scale or an offset, by which the values become depths.
+fn is_scaled(directory: &Directory) -> bool {
+    let metadata = directory.gdal.as_deref().unwrap_or_default();
+    let differs = |(role, usual): (&str, f64)| {
+        let mut values = metadata.split(role).skip(1).map(|rest| rest.split('<').next().unwrap_or_default());
+        values.any(|value| value.trim().parse::<f64>() != Ok(usual))
+    };
+    [("role=\"scale\">", 1.0), ("role=\"offset\">", 0.0)].into_iter().any(differs)
+}
+
+/// The directory of a page, or of the only one.
+fn directory(tiff: &[u8], page: Option<usize>) -> Option<Directory> {
     let directories = tiff_tags::directories(tiff).ok()?;
-    let mut pages = directories.iter().filter(|directory| !directory.reduced() && !directory.mask());
-    let text = pages.nth(page.unwrap_or(1).saturating_sub(1))?.nodata.as_deref()?;
-    text.trim().parse::<f64>().ok().map(|value| value as f32)
+    let mut pages = directories.into_iter().filter(|directory| !directory.reduced() && !directory.mask());
+    pages.nth(page.unwrap_or(1).saturating_sub(1))
 }
 
 /// Where a mask is not 0: an image without lossy compression, or a `.npy` of bool, integers or floats.
@@ -277,6 +299,23 @@ mod tests {
             let (values, nodata) = read_with_nodata(&path).unwrap();
             assert_eq!((values[[0, 0]], values[[0, 1]].is_nan()), (5.0, true));
             assert_eq!(nodata, Some(NoData { value, pixels: 2 }), "{text}");
+        }
+    }
+
+    #[test]
+    fn values_that_gdal_scales_are_refused() {
+        let item = |role: &str, value: &str| format!("<Item name=\"X\" role=\"{role}\">{value}</Item>");
+        for (scale, offset, is_read) in [("1000", "0", false), ("1", "0.5", false), ("1", "0", true)] {
+            let metadata = [item("offset", offset), item("scale", scale)].concat();
+            let mut bytes = Cursor::new(Vec::new());
+            let mut encoder = TiffEncoder::new(&mut bytes).unwrap();
+            let mut image = encoder.new_image::<Gray32Float>(1, 1).unwrap();
+            image.encoder().write_tag(tiff::tags::Tag::Unknown(42112), metadata.as_str()).unwrap();
+            image.write_data(&[0.9]).unwrap();
+            let (_folder, path) = stored("a.tif", bytes.get_ref());
+            let found = read(&path);
+            assert_eq!(found.is_ok(), is_read, "{scale} {offset}: {found:?}");
+            assert!(is_read || found.unwrap_err().to_string().contains("-unscale"));
         }
     }
 

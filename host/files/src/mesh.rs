@@ -1,6 +1,5 @@
-//! Surface mesh as binary PLY for MeshLab, CloudCompare and Blender. The aperture is in the front focal plane, so the
-//! chief ray of an object point at distance z from the lens passes through the front focus: a pixel of pitch p sees p
-//! (z - F) / F of the object at any sensor position. x to the right, y up, z towards the viewer, in the depths' unit.
+//! Surface mesh as binary PLY for MeshLab, CloudCompare and Blender: x to the right, y up, z towards the viewer, in the
+//! depths' unit.
 
 use std::io::{self, Write};
 
@@ -12,9 +11,13 @@ use crate::map;
 /// Depth step between surfaces, part of the map's range.
 const STEP: f32 = 0.1;
 
+/// Chief rays through one point: a pixel of pitch p sees `p (z - centre) / distance` of the object at depth z.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Projection {
-    pub focal_length_mm: f64,
+    /// Centre of projection before the lens: the front focus of a lens that is telecentric on the image side.
+    pub centre_mm: f64,
+    /// Principal distance: the focal length of such a lens.
+    pub distance_mm: f64,
     pub pixel_um: f64,
     /// Column and row of the optical axis; `None`: centre.
     pub axis_px: Option<[f64; 2]>,
@@ -29,7 +32,7 @@ impl Projection {
     #[inline]
     pub fn beside_axis_mm(&self, dim: (usize, usize), column: usize, row: usize, z: f64) -> [f64; 2] {
         let axis = self.axis_in(dim);
-        let scale = self.pixel_um * 1e-3 * (z / self.focal_length_mm - 1.0);
+        let scale = self.pixel_um * 1e-3 * (z - self.centre_mm) / self.distance_mm;
         [(column as f64 - axis[0]) * scale, (axis[1] - row as f64) * scale]
     }
 }
@@ -37,7 +40,7 @@ impl Projection {
 /// Positions of pixels' object points relative to the optical axis.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Lateral {
-    /// Along rays through the lens' front focus; depths are in mm.
+    /// Along the lens' chief rays; depths are in mm.
     Lens(Projection),
     /// Side of a pixel at the object, in the unit of the depths.
     Pixel(f64),
@@ -267,7 +270,7 @@ mod tests {
 
     #[test]
     fn a_thinned_map_has_the_axis_of_the_whole_one() {
-        let projection = Projection { focal_length_mm: 50.0, pixel_um: 7.4, axis_px: None };
+        let projection = Projection { centre_mm: 50.0, distance_mm: 50.0, pixel_um: 7.4, axis_px: None };
         let (dim, step) = ((1537, 2050), 6);
         for axis_px in [None, Some([100.0, 7.5])] {
             let lateral = Lateral::Lens(Projection { axis_px, ..projection });
@@ -283,7 +286,7 @@ mod tests {
     #[test]
     fn holes_have_no_vertices_and_steps_no_faces() {
         let depth = array![[900.0f32, 900.1, f32::NAN], [900.2, 900.1, 890.0]];
-        let projection = Projection { focal_length_mm: 50.0, pixel_um: 7.4, axis_px: None };
+        let projection = Projection { centre_mm: 50.0, distance_mm: 50.0, pixel_um: 7.4, axis_px: None };
         let bytes = ply(depth.view(), depth.view(), Lateral::Lens(projection), "mm");
         let text = String::from_utf8_lossy(&bytes);
         assert!(text.contains("element vertex 5\n"), "{text}");

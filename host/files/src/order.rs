@@ -11,6 +11,8 @@ use std::{
     time::SystemTime,
 };
 
+use unicode_normalization::UnicodeNormalization as _;
+
 use crate::image_file::metadata::taken;
 use name::{Name, counting};
 use reading::read;
@@ -86,13 +88,18 @@ pub(crate) fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// A name without its ending, with full-width digits as ASCII.
+/// A text with its letters composed (NFC): names from macOS may have them in parts (NFD).
+pub(crate) fn composed(text: &str) -> String {
+    text.nfc().collect()
+}
+
+/// A composed name without its ending, with full-width digits as ASCII.
 pub(crate) fn stem(path: &Path) -> String {
     let ascii = |c: char| {
         let value = u32::from(c).checked_sub(u32::from('\u{ff10}'));
         value.and_then(|value| char::from_digit(value, 10)).unwrap_or(c)
     };
-    path.file_stem().unwrap_or_default().to_string_lossy().chars().map(ascii).collect()
+    composed(&path.file_stem().unwrap_or_default().to_string_lossy()).chars().map(ascii).collect()
 }
 
 /// Last number of a name, with the surrounding text and digit count.
@@ -278,6 +285,15 @@ mod tests {
         let names = ["z\u{ff11}.png", "z\u{ff12}.png", "z\u{ff11}\u{ff10}.png"];
         assert_eq!(sorted(&[names[2], names[1], names[0]]), names);
         assert_eq!(numbers(&names.map(PathBuf::from)), [Some(1.0), Some(2.0), Some(10.0)]);
+    }
+
+    #[test]
+    fn names_in_parts_are_those_of_whole_letters() {
+        let names = ["Ho\u{308}he_1.png", "H\u{f6}he_2.png", "Ho\u{308}he_10.png"];
+        assert_eq!(sorted(&[names[2], names[1], names[0]]), names);
+        assert_eq!(numbers(&names.map(PathBuf::from)), [Some(1.0), Some(2.0), Some(10.0)]);
+        let twins = ["Ho\u{308}he_1.png", "H\u{f6}he_1.png"].map(PathBuf::from);
+        assert!(same_stem(&twins).is_some());
     }
 
     #[test]

@@ -24,18 +24,7 @@ pub enum Alignment {
     Coral,
 }
 
-impl std::str::FromStr for Alignment {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "none" => Ok(Self::None),
-            "mean" => Ok(Self::Mean),
-            "spread" => Ok(Self::Spread),
-            "coral" => Ok(Self::Coral),
-            other => Err(format!("unknown alignment `{other}`: expected none, mean, spread or coral")),
-        }
-    }
-}
+farnear_silhouettes::named!(Alignment, "alignment", "none" => None, "mean" => Mean, "spread" => Spread, "coral" => Coral);
 
 /// Mean and covariance of frame vectors, with equal weight per clip.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -24,16 +24,7 @@ pub enum Views {
     Fused,
 }
 
-impl std::str::FromStr for Views {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "each" => Ok(Self::Each),
-            "fused" => Ok(Self::Fused),
-            other => Err(format!("unknown views `{other}`: expected each or fused")),
-        }
-    }
-}
+farnear_silhouettes::named!(Views, "views", "each" => Each, "fused" => Fused);
 
 impl Views {
     /// Groups of views that form a pattern each.

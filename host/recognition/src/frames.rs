@@ -19,16 +19,7 @@ pub enum Mode {
     Ordered,
 }
 
-impl std::str::FromStr for Mode {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "order-free" => Ok(Self::OrderFree),
-            "ordered" => Ok(Self::Ordered),
-            other => Err(format!("unknown mode `{other}`: expected order-free or ordered")),
-        }
-    }
-}
+farnear_silhouettes::named!(Mode, "mode", "order-free" => OrderFree, "ordered" => Ordered);
 
 /// Weights of a frame vector's parts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -250,9 +250,7 @@ mod tests {
 
     fn model(members: usize) -> Recogniser {
         let clips = |first: usize, people: usize| {
-            let mut clips = everyday::clips(first, people, Scaling::default());
-            clips.retain(|clip| ["walk", "lie down"].contains(&clip.activity.as_str()));
-            clips
+            everyday::clips_of(&["walk", "lie down"], first, people, Scaling::default())
         };
         let space = SpaceSettings { dimensions: 4, gallery: 100, ..SpaceSettings::default() };
         let network = NetworkSettings { widths: [4, 5, 6], passes: 1, members, ..NetworkSettings::default() };

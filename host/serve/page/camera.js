@@ -1,6 +1,6 @@
 // Camera settings other than exposure: gain, black level, pixel format, region.
 import { act, hasControl, ended, on } from "./link.js";
-import { h, button, choice, field, rows } from "./ui.js";
+import { h, allow, button, choice, field, rows } from "./ui.js";
 
 /** @typedef {{ name: string, value: string, range: string }} Control */
 
@@ -15,7 +15,7 @@ export function make() {
   const element = h("details", { class: "camera" }, h("summary", {}, "Gain, region and what else it has"), place);
   element.addEventListener("toggle", () => element.open && hasControl() && look([]));
   on("state", ({ rig, live, job }) => {
-    set.disabled = !hasControl() || !(rig.phase === "ready" || live.camera_alone) || job?.phase === "running";
+    allow(set, hasControl() && (rig.phase === "ready" || live.camera_alone) && job?.phase !== "running");
   });
 
   async function look(wishes) {

@@ -1,6 +1,6 @@
 // Capturing: a pair, a series, a still, a stack; and depth at once where that is wished.
 import { act, hasControl, ended, on, store } from "./link.js";
-import { h, button, choice, field, numeric, panel } from "./ui.js";
+import { h, allow, button, choice, field, numeric, panel } from "./ui.js";
 import { key } from "./keys.js";
 
 /** @type {HTMLElement | null} */
@@ -49,7 +49,7 @@ export function make() {
   ];
   on("state", (state) => {
     const able = hasControl() && state.rig.phase === "ready" && state.job?.phase !== "running";
-    for (const control of all) control.disabled = !able;
+    for (const control of all) allow(control, able);
     const lit = state.live.light_percent.some((percent) => percent > 0);
     ambient.disabled = !lit;
     ambient.checked &&= lit;

@@ -5,6 +5,7 @@ import { Viewer } from "./viewer.js";
 import { bars } from "./plot.js";
 import { NAMES, bar, paint, range } from "./maps.js";
 import { parse } from "./npy.js";
+import * as png from "./png.js";
 import * as measure from "./measure.js";
 import { REASONS, REASON_COLOURS } from "./reasons.js";
 
@@ -236,11 +237,13 @@ export function make(host, remember) {
     const solid = layer === "surface" && maps.depth;
     surface.hidden = !solid;
     viewer.element.hidden = Boolean(solid);
+    reasons.replaceChildren(...(layer === "reason" && maps.reason ? reasonLegend(maps.reason) : []));
+    for (const part of [low, legend, high]) part.hidden = layer === "reason";
     if (solid) {
       const ends = range(maps.depth, 0);
       bar(legend, "viridis", ends, "mm");
       [low.textContent, high.textContent] = ends.map((mm) => number(mm, 2, "mm"));
-      bars(histogram, counts(maps.depth, ends));
+      bars(histogram, counts(maps.depth, ends), ends, "mm");
       return turn();
     }
     turning?.();
@@ -253,8 +256,6 @@ export function make(host, remember) {
     }
     const ends = limits(layer, map);
     const picture = layer === "reason" ? paintReasons(map) : paint(map, ends, colours(layer), layer === "depth" ? maps.confidence?.data : null);
-    reasons.replaceChildren(...(layer === "reason" ? reasonLegend(map) : []));
-    for (const part of [low, legend, high]) part.hidden = layer === "reason";
     viewer.wipe = wipe.value / 100;
     const { second = null, figures = "" } = await compared().catch(/** @returns {Compared} */ (error) => {
       if (painting === show.painting) notice(error.message, "error", error.hint);
@@ -270,7 +271,7 @@ export function make(host, remember) {
     const decimals = layer === "confidence" ? 1 : 2;
     low.textContent = number(ends[0], decimals, UNITS[layer]);
     high.textContent = number(ends[1], decimals, UNITS[layer]);
-    bars(histogram, counts(map, ends));
+    bars(histogram, counts(map, ends), ends, UNITS[layer]);
   }
 
   /** Another map minus this one, with its figures. @param {import("./maps.js").NumberMap} map @returns {Compared} */
@@ -387,13 +388,7 @@ function reasonLegend({ data }) {
 /** A map or an image as numbers. */
 async function load(path) {
   const buffer = await bytes(path);
-  if (path.endsWith(".npy")) return parse(buffer);
-  const picture = await createImageBitmap(new Blob([buffer]));
-  const canvas = h("canvas", { width: picture.width, height: picture.height });
-  const context = canvas.getContext("2d", { willReadFrequently: true });
-  context.drawImage(picture, 0, 0);
-  const { data } = context.getImageData(0, 0, picture.width, picture.height);
-  return { width: picture.width, height: picture.height, data: Float32Array.from({ length: data.length / 4 }, (_, at) => data[4 * at]) };
+  return path.endsWith(".npy") ? parse(buffer) : png.parse(buffer);
 }
 
 /** @param {import("./maps.js").NumberMap} map @param {number[]} ends */
@@ -472,8 +467,10 @@ function furtherOptions(request) {
 
 /** Lateral size of a pixel of the image at a distance of a thin lens, mm. A lens calibrated from a stack may give that of averaged pixels. */
 function pixelAt(mm, optics) {
-  const [pixel, focal] = [optics?.sensor?.pixel_um / (optics?.stage?.bin ?? 1), optics?.lens?.focal_length_mm];
-  return pixel > 0 && mm > focal ? ((pixel / 1000) * (mm - focal)) / focal : NaN;
+  const [pixel, focal, far] = [optics?.sensor?.pixel_um / (optics?.stage?.bin ?? 1), optics?.lens?.focal_length_mm, optics?.focus?.far_mm];
+  // Rays meet in the front focus, or in a lens that is not telecentric.
+  const [centre, distance] = optics?.lens?.telecentric === false ? [0, (focal * far) / (far - focal)] : [focal, focal];
+  return pixel > 0 && mm > focal && optics.stage?.scale_known !== false ? ((pixel / 1000) * (mm - centre)) / distance : NaN;
 }
 
 /** A bar of 1, 2 or 5 times a power of ten mm, at most a quarter of the picture.

@@ -1,6 +1,6 @@
 // Guides with pictures: first power-up, point spread function, flat series, and people before the camera.
 import { act, call, hasControl, ended, get, on, onJob, store } from "./link.js";
-import { h, button, choice, field, notice, number, numeric, optional, panel, rows } from "./ui.js";
+import { h, allow, button, choice, field, notice, number, numeric, optional, panel, rows } from "./ui.js";
 import * as draw from "./guide-pictures.js";
 import * as people from "./people.js";
 import { Plot } from "./plot.js";
@@ -46,9 +46,9 @@ export function make(host) {
   const enable = () => {
     if (!store.state) return;
     const { rig, job, computation } = store.state;
-    for (const control of host.querySelectorAll("[data-needs=rig]")) control.disabled = !hasControl() || rig.phase !== "ready" || job?.phase === "running";
-    for (const control of host.querySelectorAll("[data-needs=computation]")) control.disabled = !hasControl() || computation?.phase === "running";
-    for (const control of host.querySelectorAll("[data-needs=client]")) control.disabled = !store.client || computation?.phase === "running";
+    for (const control of host.querySelectorAll("[data-needs=rig]")) allow(control, hasControl() && rig.phase === "ready" && job?.phase !== "running");
+    for (const control of host.querySelectorAll("[data-needs=computation]")) allow(control, hasControl() && computation?.phase !== "running");
+    for (const control of host.querySelectorAll("[data-needs=client]")) allow(control, store.client !== null && computation?.phase !== "running");
   };
   on("state", enable);
   pick("power");

@@ -1,8 +1,12 @@
 // The keyboard. Esc stops the rig from anywhere, also while something is typed.
 import { stop } from "./link.js";
-import { h, button, notice, popUp } from "./ui.js";
+import { h, button, kept, notice, popUp } from "./ui.js";
 
 const keys = new Map();
+
+/** Where the browser keeps that letters, digits and signs are not keys. Speech input types them by accident. */
+const SETTING = "farnear-keys";
+let single = kept("localStorage", SETTING) !== "off";
 
 /** A key with what it does, and the words for it. */
 export function key(name, about, action) {
@@ -43,7 +47,7 @@ export function listen() {
     }
     const typing = event.target instanceof Element && event.target.matches("input, textarea, select, [contenteditable], dialog, dialog *, [role=application]");
     // A key that is held down acts once: the page would flash, or the rig get a request for each repetition.
-    if (typing || event.repeat || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (!single || typing || event.repeat || event.ctrlKey || event.metaKey || event.altKey) return;
     const found = keys.get(event.key) ?? keys.get(event.key.toLowerCase());
     if (found) {
       event.preventDefault();
@@ -52,10 +56,19 @@ export function listen() {
   }, { capture: true });
 }
 
-/** Shows the keys. */
+/** Closes the list. @type {(() => void) | undefined} */
+let close;
+
+/** Shows the keys, and whether they are in use. */
 export function help() {
-  const close = popUp("Keys", [h("h2", {}, "Keys"),
+  close?.();
+  const use = h("input", { type: "checkbox", checked: single, onchange: () => {
+    single = use.checked;
+    kept("localStorage", SETTING, single ? null : "off");
+  } });
+  close = popUp("Keys", [h("h2", {}, "Keys"),
     h("dl", { class: "rows" }, h("dt", {}, h("kbd", {}, "Esc")), h("dd", {}, "Stop all motion"),
       [...keys].map(([name, { about }]) => [h("dt", {}, h("kbd", {}, name)), h("dd", {}, about)]).flat()),
-    h("div", { class: "actions" }, button("Close", () => close(), { class: "primary" }))], () => close());
+    h("label", { class: "check" }, use, "Use these keys; Esc always stops"),
+    h("div", { class: "actions" }, button("Close", () => close?.(), { class: "primary" }))], () => close?.());
 }

@@ -14,6 +14,8 @@ const REMEMBERED = 300;
 const SHARP = 26;
 /** Codes, of 255, between which the brightest pixels are well exposed, and the one aimed at: as `farnear rig capture --auto-exposure`. */
 const [DARKEST, AIM, BRIGHTEST] = [190, 204, 220];
+/** Ends of the codes of a pixel. */
+const CODES = [0, 255];
 /** Exposure times that are tried. */
 const TRIES = 8;
 /** From one change of the curves, figures and words beside the image to the next, ms: the page is laid out anew for each, which takes
@@ -173,7 +175,7 @@ export function make(host) {
     forgetValues();
     focus.replaceChildren("–");
     plot.set([[], []]);
-    bars(histogram, []);
+    bars(histogram, [], CODES);
     figures.replaceChildren(mode === "depth" ? h("p", { class: "dim" }, "Live depth has no focus value and no histogram.") : "");
     keep(warnings, [], () => []);
     write(status, { image: "waiting for the first image", depth: "waiting for the first map" }[mode] ?? "live is off");
@@ -244,7 +246,7 @@ export function make(host) {
     status.textContent = `${number(header.rate_hz, 1)} frames/s`;
     focus.replaceChildren(found.focus == null ? "–" : `${found.focus.toPrecision(4)}`, h("small", {}, best ? ` ${number((100 * (found.focus ?? 0)) / best, 0)} % of the largest` : ""));
     plot.set([values.map((_, at) => at - values.length + 1), values]);
-    bars(histogram, found.histogram, (at) => at === 255);
+    bars(histogram, found.histogram, CODES, "", (at) => at === CODES[1]);
     figures.replaceChildren(rows([["mean", `${number(100 * found.mean, 1)} %`], ["saturated", `${number(100 * found.saturated_fraction, 2)} %`], ["contrast", number(found.contrast, 3)]]));
     keep(warnings, found.warnings, () => found.warnings.map((text) => h("li", {}, text)));
     capture.warn(found.warnings);

@@ -1,6 +1,6 @@
 // The page: views, connection to the rig, control, alarms, running jobs.
 import { act, hasControl, on, open, stop, store } from "./link.js";
-import { h, ask, button, dropErrors, keep, kept, notice, refocus, say, write } from "./ui.js";
+import { h, ask, button, dropErrors, ignoreMarked, keep, kept, notice, refocus, say, write } from "./ui.js";
 import { help, key, listen } from "./keys.js";
 import * as rig from "./rig.js";
 import * as live from "./live.js";
@@ -214,6 +214,7 @@ function begin() {
   // The link's address would leave the view.
   document.querySelector(".skip")?.addEventListener("click", (event) => { event.preventDefault(); $("view").focus(); });
   $("theme").addEventListener("click", turnTheme);
+  $("keys").addEventListener("click", help);
   key("t", "Light or dark", turnTheme);
   const { parts } = views.get("depth");
   whenCaptured(
@@ -228,6 +229,7 @@ function begin() {
     showJob(state, before);
     showQuestions(state);
   });
+  ignoreMarked();
   listen();
   open();
   const addressed = (back) => {

@@ -67,7 +67,7 @@ export function show(host, buffer, shade = "depth") {
 
 /** Where there is no WebGL. */
 export function sorry(host, error) {
-  host.replaceChildren(h("p", { class: "empty" }, `This browser cannot show the surface: ${error.message}. mesh.ply opens in MeshLab or Blender.`));
+  host.replaceChildren(h("p", { class: "empty" }, `This browser cannot show the surface: ${error.message.replace(/\.$/, "")}. mesh.ply opens in MeshLab or Blender.`));
 }
 
 function turn(event, camera, controls) {

@@ -130,10 +130,14 @@ function show(canvas, pixels, width, height) {
   canvas.getContext("2d").putImageData(image, 0, 0);
 }
 
-/** A stripe of colour for each answer. */
+/** A stripe of colour for each answer, and how often each was given. */
 function stripes(canvas, past) {
   const context = canvas.getContext("2d");
   context.clearRect(0, 0, canvas.width, canvas.height);
+  /** @type {Map<string, number>} */
+  const tally = new Map();
+  for (const name of past) tally.set(name ?? "unknown", (tally.get(name ?? "unknown") ?? 0) + 1);
+  canvas.setAttribute("aria-label", `Answers at the last ${past.length} frames shown: ${[...tally].map(([name, count]) => `${name} ${count}`).join(", ")}`);
   past.forEach((name, at) => {
     let hash = 7;
     for (const letter of name ?? "") hash = (hash * 31 + letter.charCodeAt(0)) % 360;

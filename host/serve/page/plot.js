@@ -1,4 +1,5 @@
 // Curves and histograms in the page's colours.
+import "./language.js";
 import uPlot from "./vendor/uplot.js";
 import { colour, pen } from "./ui.js";
 
@@ -40,6 +41,9 @@ export class Plot {
 
   set(data) {
     this.data = data;
+    const { label, x, y, names, band } = this.options;
+    const about = (band ? names.slice(0, 1) : names).map((name, at) => summary(name, data[0], data[at + 1]));
+    this.host.setAttribute("aria-label", `${label}${x && y ? ` (${y} over ${x})` : ""}: ${about.join("; ")}`);
     if (this.plot) this.plot.setData(data);
     else this.size();
   }
@@ -50,9 +54,32 @@ export class Plot {
   }
 }
 
-/** Bars on a canvas: `counts` from left to right; the marked ones in the warning colour.
- * @param {HTMLCanvasElement} canvas @param {number[]} counts @param {(at: number) => boolean} marked */
-export function bars(canvas, counts, marked = () => false) {
+/** A figure in words of a plot. @param {number} value */
+const figure = (value) => String(Number(value.toPrecision(5))).replace("-", "−");
+
+/** Values in words: how many, between which ends, and where the largest is. @param {string} name @param {number[]} places @param {(number | null)[]} values */
+function summary(name, places, values) {
+  const known = values.flatMap((value, at) => (value != null && Number.isFinite(value) ? [[value, places[at]]] : []));
+  const title = name && `${name}, `;
+  if (!known.length) return `${title}no values`;
+  const [most, place] = known.reduce((one, other) => (other[0] > one[0] ? other : one));
+  const least = Math.min(...known.map(([value]) => value));
+  return `${title}${known.length} values from ${figure(least)} to ${figure(most)}, the largest at ${figure(place)}`;
+}
+
+/** Names a histogram by its contents. @param {HTMLCanvasElement} canvas @param {number[]} counts @param {number[]} ends @param {string} unit */
+function describe(canvas, counts, [low, high], unit) {
+  const name = (canvas.dataset.name ??= canvas.getAttribute("aria-label") ?? "");
+  const total = counts.reduce((sum, count) => sum + count, 0);
+  const peak = low + (counts.indexOf(Math.max(...counts)) * (high - low)) / (counts.length - 1);
+  const [from, to, near] = [low, high, peak].map((value) => `${figure(value)}${unit && ` ${unit}`}`);
+  canvas.setAttribute("aria-label", `${name}: ${total ? `${total} pixels from ${from} to ${to}, most near ${near}` : "no values"}`);
+}
+
+/** Bars on a canvas: `counts` from left to right, between the `ends` of their values; the marked ones in the warning colour.
+ * @param {HTMLCanvasElement} canvas @param {number[]} counts @param {number[]} ends @param {string} unit @param {(at: number) => boolean} marked */
+export function bars(canvas, counts, ends, unit = "", marked = () => false) {
+  describe(canvas, counts, ends, unit);
   const ratio = devicePixelRatio || 1;
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
   if (!width) return;

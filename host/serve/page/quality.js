@@ -1,6 +1,6 @@
 // How good depth is, as owners of depth cameras ask: fill rate, plane fit, noise over time, accuracy against a known distance.
 import { act, get, on, onJob, store } from "./link.js";
-import { h, button, field, number, numeric, optional, panel, notice, when } from "./ui.js";
+import { h, allow, button, field, number, numeric, optional, panel, notice, when } from "./ui.js";
 
 /** Makes the view. */
 export function make(host) {
@@ -45,6 +45,6 @@ export function make(host) {
     }
   }
   onJob("quality", ({ phase }, old) => { if (phase === "done" && !old) refresh(); });
-  on("state", (state) => { start.disabled = state.rig.phase !== "ready" || state.job?.phase === "running" || state.control.holder !== store.client?.client; });
+  on("state", (state) => { allow(start, state.rig.phase === "ready" && state.job?.phase !== "running" && state.control.holder === store.client?.client); });
   return { shown: refresh };
 }

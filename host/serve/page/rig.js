@@ -1,6 +1,6 @@
 // The rig: how it is, and moving it. Always in reach.
 import { act, call, hasControl, get, on, store } from "./link.js";
-import { h, button, choice, keep, notice, number, numeric, rows } from "./ui.js";
+import { h, allow, button, choice, keep, notice, number, numeric, rows } from "./ui.js";
 import { draw, listen } from "./stages.js";
 import { key } from "./keys.js";
 
@@ -37,7 +37,7 @@ export function mount(host) {
     stages.hidden = !rig.info;
     if (more.open) facts.replaceChildren(details(rig));
     stages.classList.toggle("able", able());
-    for (const control of host.querySelectorAll("[data-needs=control]")) control.disabled = !able();
+    for (const control of host.querySelectorAll("[data-needs=control]")) allow(control, able());
   };
   on("state", (state, before) => {
     if (!before || state.optics !== before.optics) measure().then(() => store.state && show(store.state));

@@ -1,6 +1,6 @@
 // The captures of the session: pictures, notes and downloads.
 import { act, ended, get, on, store } from "./link.js";
-import { ask, h, button, choice, notice, number, refocus, when } from "./ui.js";
+import { ask, h, allow, button, choice, notice, number, refocus, when } from "./ui.js";
 
 /** Makes the view. `open(name)` shows a capture's depth. */
 export function make(host, open) {
@@ -13,13 +13,13 @@ export function make(host, open) {
   const measure = button("Compute depth of all", async () => {
     const pairs = shown.filter((capture) => capture.kind === "pair" && !capture.has_depth && !capture.broken).reverse();
     if (!pairs.length) notice("No pair without a depth is shown here.");
-    measure.disabled = true;
+    allow(measure, false);
     for (const [at, { name }] of pairs.entries()) {
       measure.textContent = `Depth ${at + 1} of ${pairs.length}`;
       const begun = await act(`/api/captures/${encodeURIComponent(name)}/depth`, { uncertainty: "estimated" });
       if (!begun || (await ended("computation", begun.job)).phase !== "done") break;
     }
-    measure.disabled = false;
+    allow(measure, true);
     measure.textContent = "Compute depth of all";
     refresh();
   }, { title: "Of the pairs shown here that have none" });

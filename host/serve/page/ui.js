@@ -60,6 +60,22 @@ export function button(text, onclick, attributes = {}) {
   return h("button", { type: "button", onclick, ...attributes }, text);
 }
 
+/** Lets a control be used, or not. A browser takes the focus from a disabled control: one that has the focus is only marked, and `ignoreMarked` drops its clicks.
+ * @param {HTMLButtonElement | HTMLInputElement} control @param {boolean} able */
+export function allow(control, able) {
+  control.setAttribute("aria-disabled", String(!able));
+  control.disabled = !able && control !== document.activeElement;
+}
+
+/** Drops clicks on controls that are marked as disabled. */
+export function ignoreMarked() {
+  addEventListener("click", (event) => {
+    if (!(event.target instanceof Element && event.target.closest("[aria-disabled=true]"))) return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+  }, { capture: true });
+}
+
 /** Rows of a name and a value. */
 export function rows(pairs) {
   return h("dl", { class: "rows" }, pairs.filter(Boolean).map(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]).flat());
@@ -194,5 +210,7 @@ export function keep(host, key, build) {
   const text = JSON.stringify(key);
   if (host.dataset.key === text) return;
   host.dataset.key = text;
+  const within = host.contains(document.activeElement);
   host.replaceChildren(...[build()].flat());
+  if (within) refocus();
 }

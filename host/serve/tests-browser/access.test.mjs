@@ -133,6 +133,79 @@ test("a key that is held down acts once", async () => {
   assert.equal(sent.filter(({ path }) => path === "/api/live").length, 1);
 });
 
+test("letters act no more once they are switched off, and Esc still stops", async () => {
+  const page = await open(browser, `${server.address}#log`);
+  await page.getByRole("button", { name: "Keys" }).click();
+  await page.getByLabel("Use these keys; Esc always stops").uncheck();
+  await page.getByRole("button", { name: "Close", exact: true }).click();
+  await page.reload();
+  await page.locator("#link[data-phase=ready]").waitFor();
+  const sent = posts(page);
+  await page.keyboard.press("l");
+  await page.keyboard.press("Escape");
+  await page.waitForTimeout(300);
+  assert.deepEqual(sent.map(({ path }) => path).filter((path) => /live|stop/.test(path)), ["/api/stop"]);
+});
+
+test("a button keeps the focus while its job runs, and does nothing then", async () => {
+  const page = await open(browser, `${server.address}#live`);
+  await page.locator("#who", { hasText: "you have control" }).waitFor();
+  await page.getByLabel("compute depth").uncheck(); // the view stays
+  const capture = page.getByRole("button", { name: "Capture pair" });
+  const sent = posts(page);
+  await capture.press("Enter");
+  await page.locator("[data-capture][aria-disabled=true]").first().waitFor();
+  await page.keyboard.press("Enter");
+  await page.locator("[data-capture][aria-disabled=false]").first().waitFor();
+  assert.ok(await capture.evaluate((button) => button === document.activeElement));
+  assert.equal(sent.filter(({ path }) => path === "/api/captures").length, 1);
+});
+
+test("a plot and a histogram tell their range, their largest value and how many there are", async () => {
+  const page = await depth();
+  assert.match(await page.locator("#view-depth .histogram").getAttribute("aria-label"), /^distribution of the values: \d{5,6} pixels from [\d.]+ mm to [\d.]+ mm, most near [\d.]+ mm$/);
+  await page.locator("#view-depth [data-tool=line]").click();
+  const box = await drawn(page).boundingBox();
+  await page.mouse.move(box.x + 0.3 * box.width, box.y + 0.5 * box.height);
+  await page.mouse.down();
+  await page.mouse.move(box.x + 0.7 * box.width, box.y + 0.5 * box.height);
+  await page.mouse.up();
+  const plot = page.locator("#view-depth .plot[aria-label*=values]");
+  await plot.waitFor();
+  assert.match(await plot.getAttribute("aria-label"), /: depth, \d{3} values from [\d.]+ to [\d.]+, the largest at \d+/);
+});
+
+test("reasons are right where a browser changes what is read from a canvas, and the surface does not keep their legend", async () => {
+  const context = await browser.newContext();
+  await context.addInitScript(() => {
+    const { getImageData } = CanvasRenderingContext2D.prototype;
+    CanvasRenderingContext2D.prototype.getImageData = function (...given) {
+      const image = getImageData.apply(this, given);
+      image.data.fill(77);
+      return image;
+    };
+  });
+  const page = await context.newPage();
+  await page.goto(`${server.address}#depth/pair-001`);
+  await page.locator("canvas[data-layer=depth]").waitFor();
+  await page.locator("button[data-layer=reason]:enabled").click();
+  const legend = page.locator(".reasons span");
+  await legend.filter({ hasText: "depth measured" }).waitFor();
+  const wrong = await page.evaluate(async () => {
+    const buffer = await (await fetch("/api/captures/pair-001/files/far.png")).arrayBuffer();
+    const picture = await createImageBitmap(new Blob([buffer]));
+    const context = new OffscreenCanvas(picture.width, picture.height).getContext("2d");
+    context.drawImage(picture, 0, 0);
+    const { data } = context.getImageData(0, 0, picture.width, picture.height);
+    const image = await (await import("/png.js")).parse(buffer);
+    return image.data.filter((value, at) => value !== data[4 * at]).length;
+  });
+  assert.equal(wrong, 0);
+  await page.locator("button[data-layer=surface]:enabled").click();
+  await legend.first().waitFor({ state: "detached" });
+  assert.ok(await page.locator("#view-depth .legend-bar").isVisible());
+});
+
 test("a question answers itself with nothing that is typed for a field", async () => {
   const page = await open(browser, server.address);
   await page.getByLabel("Lens: go to, in µm").click();
@@ -262,10 +335,11 @@ test("dates have one form in every language, and the sun's time is also shown in
   await page.locator("#view-guides dd", { hasText: "2026-06-21 03:00" }).waitFor();
 });
 
-test("the page starts in a browser that keeps nothing for it", async () => {
+test("the page starts in a browser that keeps nothing for it and has no known language", async () => {
   const context = await browser.newContext();
   await context.addInitScript(() => {
     for (const name of ["localStorage", "sessionStorage"]) Object.defineProperty(globalThis, name, { get() { throw new DOMException("denied", "SecurityError"); } });
+    Object.defineProperty(Navigator.prototype, "language", { get: () => "C" });
   });
   const page = await context.newPage();
   await page.goto(server.address);

@@ -19,7 +19,6 @@ use super::projection::{self, ImageShadow, ShadowError, Subject};
 use farnear_silhouettes::mask::Mask;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI};
-use std::{fmt, str::FromStr};
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -30,25 +29,7 @@ pub enum Method {
     Thesis,
 }
 
-impl fmt::Display for Method {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Hybrid => "hybrid",
-            Self::Thesis => "thesis",
-        })
-    }
-}
-
-impl FromStr for Method {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "hybrid" => Ok(Self::Hybrid),
-            "thesis" => Ok(Self::Thesis),
-            other => Err(format!("unknown shadow method `{other}`: expected hybrid or thesis")),
-        }
-    }
-}
+farnear_silhouettes::named!(Method, "shadow method", "hybrid" => Hybrid, "thesis" => Thesis);
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CutReport {
@@ -65,7 +46,7 @@ pub struct CutReport {
     pub missing: Option<f64>,
     pub shadow: ImageShadow,
     pub subject: Subject,
-    /// False if more than half was removed or the shadow points away: check the frame.
+    /// False if more than 60 % was removed, or if the shadow points away or is shortened: check the frame.
     pub trustworthy: bool,
 }
 

@@ -4,12 +4,12 @@
 //! colour and the empty scene. Known limits: chromaticity fails on grey clothes, geometry on shadows under
 //! the body's own columns, texture on smooth ground.
 
-pub mod chromaticity;
-pub mod geometry;
+mod chromaticity;
+mod geometry;
 mod images;
-pub mod large_region;
-pub mod physical;
-pub mod small_region;
+mod large_region;
+mod physical;
+mod small_region;
 
 use std::fmt;
 use std::str::FromStr;
@@ -55,33 +55,25 @@ impl Method {
 }
 
 #[derive(Clone, Debug)]
-pub enum Detector {
-    Chromaticity(chromaticity::Settings),
-    Physical(physical::Physical),
-    Geometry(geometry::Settings),
-    SmallRegionTexture(small_region::Settings),
-    LargeRegionTexture(large_region::Settings),
+pub struct Detector {
+    method: Method,
+    /// Learns from frame to frame; the others do not.
+    physical: physical::Physical,
 }
 
 impl Detector {
     #[must_use]
     pub fn new(method: Method) -> Self {
-        match method {
-            Method::Chromaticity => Self::Chromaticity(chromaticity::Settings::default()),
-            Method::Physical => Self::Physical(physical::Physical::new(physical::Settings::default())),
-            Method::Geometry => Self::Geometry(geometry::Settings::default()),
-            Method::SmallRegionTexture => Self::SmallRegionTexture(small_region::Settings::default()),
-            Method::LargeRegionTexture => Self::LargeRegionTexture(large_region::Settings::default()),
-        }
+        Self { method, physical: physical::Physical::default() }
     }
 
     pub fn detect(&mut self, images: &Images<'_>) -> Mask {
-        match self {
-            Self::Chromaticity(settings) => chromaticity::detect(images, settings),
-            Self::Physical(detector) => detector.detect(images),
-            Self::Geometry(settings) => geometry::detect(images, settings),
-            Self::SmallRegionTexture(settings) => small_region::detect(images, settings),
-            Self::LargeRegionTexture(settings) => large_region::detect(images, settings),
+        match self.method {
+            Method::Chromaticity => chromaticity::detect(images, &chromaticity::LIMITS),
+            Method::Physical => self.physical.detect(images),
+            Method::Geometry => geometry::detect(images),
+            Method::SmallRegionTexture => small_region::detect(images),
+            Method::LargeRegionTexture => large_region::detect(images),
         }
     }
 }

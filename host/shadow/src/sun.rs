@@ -5,8 +5,8 @@
 //! -cos d sin h`, `N = sin d cos L - cos d sin L cos h`, elevation `atan2(U, hypot(E, N))`, azimuth `atan2(E,
 //! N)` clockwise from north.
 //!
-//! Largest differences from 55 values of NREL's SPA, sun up, 1910 to 2210: PSA+ 0.0097 deg elevation and 0.045 deg
-//! azimuth; Almanac 0.0122 and 0.081; thesis 1.03 and 10.7. Over the whole globe, 1900 to 2100, PSA+ is off by up to
+//! Largest differences from 55 values of NREL's SPA, sun up, 1910 to 2210: PSA+ 0.0097 deg elevation and 0.047 deg
+//! azimuth; Almanac 0.0123 and 0.020; thesis 1.13 and 2.6. Over the whole globe, 1900 to 2100, PSA+ is off by up to
 //! 0.02 deg on the sky.
 
 mod almanac;

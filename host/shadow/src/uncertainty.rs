@@ -11,7 +11,7 @@
 
 use super::camera::{Camera, CameraFile};
 use super::projection::{GroundShadow, ShadowError, Subject, in_image, on_ground};
-use crate::sun::{self, Equatorial, Model, Place, SunError};
+use crate::sun::{self, Model, Place, SunError};
 use chrono::{DateTime, TimeDelta, Utc};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
@@ -58,11 +58,10 @@ fn horizon_partials(declination: f64, hour_angle: f64, latitude: f64) -> Horizon
 
 /// Change of declination and hour angle (radians) per day at the same time of day.
 fn per_day(time: DateTime<Utc>, model: Model) -> [f64; 2] {
-    let at = |days| -> Equatorial { sun::equatorial(time + TimeDelta::days(days), model) };
+    let at = |days| sun::equatorial(time + TimeDelta::days(days), model);
     let (before, after) = (at(-1), at(1));
-    let turn =
-        (after.greenwich_hour_angle_rad - before.greenwich_hour_angle_rad).rem_euclid(std::f64::consts::TAU);
-    let hour_angle = if turn > std::f64::consts::PI { turn - std::f64::consts::TAU } else { turn };
+    let turn = (after.greenwich_hour_angle_rad - before.greenwich_hour_angle_rad).rem_euclid(TAU);
+    let hour_angle = if turn > PI { turn - TAU } else { turn };
     [0.5 * (after.declination_rad - before.declination_rad), 0.5 * hour_angle]
 }
 

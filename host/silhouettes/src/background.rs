@@ -4,8 +4,6 @@
 mod kernel;
 pub mod light;
 mod model;
-mod settings;
 pub mod shake;
 
-pub use model::{BackgroundError, BackgroundModel, Frame, Label};
-pub use settings::{Settings, SettingsError, ShadowSettings};
+pub use model::{BackgroundError, BackgroundModel, Frame, Label, Settings};

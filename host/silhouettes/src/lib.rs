@@ -10,6 +10,7 @@
 
 pub mod background;
 pub mod mask;
+mod names;
 pub mod readers;
 pub mod silhouette;
 pub mod synthetic;

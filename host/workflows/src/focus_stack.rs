@@ -296,6 +296,8 @@ fn is_even(gains: &[f64]) -> bool {
     gains.iter().all(|gain| *gain == 1.0)
 }
 
+/// Brightness of a picture relative to its full scale below which it would be black in 8 bits.
+const BLACK: f32 = 1.0 / 256.0;
 /// Least share of pixels with a value, below which a warning is given.
 const LITTLE: f64 = 0.5;
 
@@ -341,6 +343,7 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
     context.info(&format!("measuring {} images by {}", images.count(), request.measure));
     let mut map =
         focus_stack::depth_from_positions(&images, &listed.even_positions(), &request.computation())?;
+    let white = white_of(&map.all_in_focus, images.code_step() == 0.0);
     drop(images);
     withhold(&mut map, unseen.as_ref());
     context.cancel.check("writing the results")?;
@@ -375,7 +378,7 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
     };
     staging.write("depth.npy", &npy::write(depth.view()))?;
     staging.write("confidence.npy", &npy::write(map.reliability.view()))?;
-    let codes = map.all_in_focus.mapv(|v| (v.clamp(0.0, 1.0) * f32::from(u16::MAX)).round() as u16);
+    let codes = map.all_in_focus.mapv(|v| ((v / white).clamp(0.0, 1.0) * f32::from(u16::MAX)).round() as u16);
     staging.write("all-in-focus.png", &image_file::encode_png(codes.view(), 16)?)?;
     staging.write("view.png", &view::view_png_in(figures.unit, depth.view(), map.reliability.view())?)?;
     staging.write(STACK_RECORD, toml::to_string(&record)?.as_bytes())?;
@@ -396,6 +399,28 @@ fn withhold(map: &mut StackMap, unseen: Option<&Array2<bool>>) {
     }
 }
 
+/// Value that becomes white: 1, or the brightest value if floats exceed 1 or the picture would be black in 8 bits.
+fn white_of(picture: &Array2<f32>, are_floats: bool) -> f32 {
+    let brightest = picture.iter().copied().filter(|value| value.is_finite()).fold(0.0, f32::max);
+    let is_usual = brightest <= 0.0 || brightest >= BLACK && (brightest <= 1.0 || !are_floats);
+    if is_usual { 1.0 } else { brightest }
+}
+
+/// A remark on a map with few depths.
+pub fn scarce(depth: &Array2<f32>, map: &StackMap) -> Option<String> {
+    let share = |count: usize| count as f64 / depth.len().max(1) as f64;
+    let known = share(depth.iter().filter(|depth| depth.is_finite()).count());
+    let ends = share(map.reliability.iter().filter(|reliability| **reliability == 0.0).count());
+    (known < LITTLE).then(|| {
+        format!(
+            "only {:.0} % of the picture has a depth; {:.0} % is sharpest at an end of the stack or nowhere: a longer stack, more \
+             texture or a larger window (window-px) may help",
+            100.0 * known,
+            100.0 * ends
+        )
+    })
+}
+
 fn figures(
     depth: &Array2<f32>,
     listed: &positions::Listed,
@@ -409,15 +434,7 @@ fn figures(
     let median = quantile::of_map(depth.view(), 0.5);
     let median = median.map(|median| rounded_for(f64::from(most - least), median, 3));
     let known = values.len() as f64 / depth.len().max(1) as f64;
-    let ends = map.reliability.iter().filter(|r| **r == 0.0).count() as f64 / depth.len().max(1) as f64;
-    if known < LITTLE {
-        warnings.push(format!(
-            "only {:.0} % of the picture has a depth; {:.0} % is sharpest at an end of the stack or nowhere: a longer stack, more \
-             texture or a larger --window-px may help",
-            100.0 * known,
-            100.0 * ends
-        ));
-    }
+    warnings.extend(scarce(depth, map));
     FocusStackFigures {
         images: listed.images.len(),
         left_out,
@@ -448,6 +465,21 @@ mod tests {
         ] {
             let error = request.check().unwrap_err().to_string();
             assert!(error.contains(phrase), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_picture_of_any_scale_is_neither_white_nor_black() {
+        for (brightest, are_floats, white) in [
+            (4095.0, true, 4095.0),
+            (0.9, true, 1.0),
+            (1e-6, false, 1e-6),
+            (1.02, false, 1.0),
+            (0.05, false, 1.0),
+            (0.0, true, 1.0),
+        ] {
+            let picture = ndarray::array![[0.0, brightest, f32::NAN]];
+            assert_eq!(white_of(&picture, are_floats), white, "{brightest}");
         }
     }
 }

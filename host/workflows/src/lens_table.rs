@@ -83,7 +83,7 @@ pub fn calculate(file: &OpticsFile, readings: Readings) -> Result<LensFigures> {
     let span_mm = range.far_mm - range.near_mm;
     // The radius grows from 0 to Rmax for alpha from -1 to 1: half of Rmax per unit of alpha.
     let per_tenth_px_mm = 0.2 * optics.depth_per_alpha_mm(0.0).abs() / optics.max_blur_px();
-    let footprint_mm = optics.pixel_um() * 1e-3 * (range.alpha0_mm / optics.focal_length_mm() - 1.0);
+    let footprint_mm = optics.pixel_at_object_mm(range.alpha0_mm);
     let blur = (0..SAMPLES).map(|index| {
         let alpha = -1.0 + 2.0 * index as f64 / (SAMPLES - 1) as f64;
         let [far_px, near_px] = optics.blur_px(alpha);

@@ -1,7 +1,6 @@
 //! Figures of depth maps: region with plane, profile, difference of two maps. Depth is in mm, um (stage positions) or
-//! image numbers of a stack. A pixel of pitch p covers p (z - F) / F at distance z (telecentric lens, see
-//! `farnear_files::mesh`), which gives lateral positions in mm. A stack may give the pixel size in its metadata;
-//! otherwise positions are in pixels.
+//! image numbers of a stack. Lateral positions in mm follow from the optics ([`Optics::projection_mm`]); a stack may give
+//! the pixel size in its metadata; otherwise positions are in pixels.
 
 mod difference;
 mod map_file;
@@ -118,13 +117,32 @@ pub fn lateral(optics: &Optics, part: Option<Part>) -> Lateral {
     projection(optics, part).map_or(Lateral::Unknown, Lateral::Lens)
 }
 
+/// Of a focus stack: each pixel is taken from its sharpest image, whose sensor is where that object's image lies. So a pixel of
+/// pitch p sees p (z - F) / F also of a lens that is not telecentric.
+fn lateral_of_stack(optics: &Optics) -> Lateral {
+    let focal_length_mm = optics.focal_length_mm();
+    let front_focus = |lens| Projection { centre_mm: focal_length_mm, distance_mm: focal_length_mm, ..lens };
+    projection(optics, None).map_or(Lateral::Unknown, |lens| Lateral::Lens(front_focus(lens)))
+}
+
 /// `None` where [`lateral()`] is unknown.
 pub(crate) fn projection(optics: &Optics, part: Option<Part>) -> Option<Projection> {
-    optics.stage().is_none_or(|stage| stage.scale_known).then(|| Projection {
-        focal_length_mm: optics.focal_length_mm(),
-        pixel_um: optics.pixel_um(),
-        axis_px: part.map(|part| part.axis_px()),
-    })
+    optics.stage().is_none_or(|stage| stage.scale_known).then(|| assumed_projection(optics, part))
+}
+
+/// By the nominal lens where it has no scale.
+pub(crate) fn assumed_projection(optics: &Optics, part: Option<Part>) -> Projection {
+    let [centre_mm, distance_mm] = optics.projection_mm();
+    Projection { centre_mm, distance_mm, pixel_um: optics.pixel_um(), axis_px: axis_px(optics, part) }
+}
+
+/// The optical axis in a map, which is the centre of the lens' distortion; without that the middle of the images. `None`: the middle of
+/// the map.
+fn axis_px(optics: &Optics, part: Option<Part>) -> Option<[f64; 2]> {
+    let Some(distortion) = optics.distortion() else { return part.map(|part| part.axis_px()) };
+    let [x, y] = part.map_or([0.0; 2], |part| [part.x, part.y].map(|at| at as f64 / part.bin as f64));
+    let [column, row] = distortion.centre_px();
+    Some([column - x, row - y])
 }
 
 /// Object points of a depth map, (height, width, 3) in mm as in the mesh: right, up, towards the viewer. Fails where
@@ -179,5 +197,36 @@ mod tests {
         let error = points(&with(false)).unwrap_err();
         assert!(error.is_usage() && error.to_string().contains("--object-pixel-um"), "{error}");
         assert_eq!(lateral(&with(false), None), Lateral::Unknown);
+    }
+
+    #[test]
+    fn rays_meet_in_a_lens_that_is_not_telecentric() {
+        let text =
+            include_str!("../../../examples/rig.toml").replace("[lens]", "[lens]\ntelecentric = false");
+        let optics: Optics = toml::from_str(&text).unwrap();
+        let depth = ndarray::array![[890.0, 930.0, 890.0, 930.0]];
+        let points = points_mm(depth.view(), &optics, None).unwrap();
+        for (column, z) in depth.row(0).iter().enumerate() {
+            // The sensor of the far image is 52.8313 mm behind the lens.
+            let expected = 7.4e-3 * (column as f32 - 1.5) * z / 52.8313;
+            assert!((points[(0, column, 0)] - expected).abs() < 1e-5, "{points}");
+        }
+        // Each pixel of a stack has its own sensor position.
+        let Lateral::Lens(lens) = lateral_of_stack(&optics) else { panic!("a lens with a scale") };
+        assert_eq!([lens.centre_mm, lens.distance_mm], [50.0; 2]);
+    }
+
+    #[test]
+    fn the_axis_is_the_centre_of_the_distortion() {
+        let optics = include_str!("../../../examples/rig.toml");
+        let distortion = "[distortion]\ncamera_matrix = [[6700.0, 0, 30.5], [0, 6700.0, 20.0], [0, 0, 1]]\n\
+                          coefficients = [-0.3, 0.1, 0.0, 0.0]\n";
+        let optics: Optics = toml::from_str(&format!("{optics}{distortion}")).unwrap();
+        let axis = |optics: &Optics, part| projection(optics, part).unwrap().axis_in((40, 53));
+        let part = Part { x: 5, y: 2, image_width: 64, image_height: 48, bin: 1 };
+        assert_eq!(axis(&optics, None), [30.5, 20.0]);
+        assert_eq!(axis(&optics, Some(part)), [25.5, 18.0]);
+        let averaged = Part { x: 0, y: 0, image_width: 107, image_height: 81, bin: 2 };
+        assert_eq!(axis(&optics.binned(2), Some(averaged)), [15.0, 9.75]);
     }
 }

@@ -188,8 +188,7 @@ pub fn print(settings: &TargetRequest, context: &Context<'_>) -> Result<TargetFi
         let expected = format!("expected more than the focal length, {focal_mm} mm");
         return Err(WorkflowError::parameter("distance", distance_mm, expected));
     }
-    // Object size / image size = distance from the front focal point / focal length.
-    let pixel_mm = optics.pixel_um() * 1e-3 * (distance_mm - focal_mm) / focal_mm;
+    let pixel_mm = optics.pixel_at_object_mm(distance_mm);
     let dot_mm = INCH_MM / f64::from(settings.dpi);
     let dots = (CELL_PX * pixel_mm / dot_mm).round().max(LEAST_DOTS);
     let cell_mm = dots * dot_mm;

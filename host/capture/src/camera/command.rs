@@ -143,7 +143,7 @@ pub struct CommandCamera {
     partial: Arc<AtomicUsize>,
     raw: Option<Raw>,
     /// End of the program's standard error.
-    messages: Arc<Mutex<String>>,
+    messages: Arc<Mutex<Vec<u8>>>,
     pairing: Pairing,
     ended: Option<String>,
 }
@@ -166,7 +166,7 @@ impl CommandCamera {
             _ => unusable(format!("it cannot be started: {error}")),
         })?;
         let (sender, frames) = sync_channel(QUEUE);
-        let messages = Arc::new(Mutex::new(String::new()));
+        let messages = Arc::new(Mutex::new(Vec::new()));
         let (output, errors) = (child.stdout.take(), child.stderr.take());
         let kept = Arc::clone(&messages);
         // Not joined: these threads end with the pipes or the receiver.
@@ -212,8 +212,12 @@ impl CommandCamera {
             reason += &format!(" ({status})");
         }
         let messages = self.messages.lock().unwrap_or_else(PoisonError::into_inner);
-        if !messages.trim().is_empty() {
-            reason += &format!("; it said: {}", messages.trim().replace('\n', " | "));
+        let messages = String::from_utf8_lossy(&messages);
+        // A progress display ends its lines with a carriage return.
+        let lines = messages.split(['\n', '\r']).map(str::trim).filter(|line| !line.is_empty());
+        let lines: Vec<&str> = lines.collect();
+        if !lines.is_empty() {
+            reason += &format!("; it said: {}", lines.join(" | "));
         }
         CameraError::Unusable { camera: format!("`{}`", self.name), reason }
     }
@@ -317,14 +321,21 @@ impl Drop for CommandCamera {
     }
 }
 
-fn keep_messages(errors: impl Read, kept: &Mutex<String>) {
-    for line in BufReader::new(errors).split(b'\n').map_while(Result::ok) {
+/// Keeps the end. Not by lines, because a program may never end one.
+fn keep_messages(mut errors: impl Read, kept: &Mutex<Vec<u8>>) {
+    let mut bytes = [0; 4096];
+    loop {
+        let count = match errors.read(&mut bytes) {
+            Ok(0) => return,
+            Ok(count) => count,
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => continue,
+            Err(_) => return,
+        };
         let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
-        kept.push_str(&String::from_utf8_lossy(&line));
-        kept.push('\n');
+        kept.extend_from_slice(&bytes[..count]);
         let surplus = kept.len().saturating_sub(MESSAGES);
-        let cut = (surplus..=kept.len()).find(|at| kept.is_char_boundary(*at)).unwrap_or(0);
-        kept.drain(..cut);
+        let within_a_letter = kept[surplus..].iter().take_while(|byte| **byte & 0xc0 == 0x80).count();
+        kept.drain(..surplus + within_a_letter);
     }
 }
 
@@ -432,6 +443,31 @@ fn read_y4m(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Standard error without a line's end. What came so far is kept by the second read.
+    struct Endless<'a>(&'a Mutex<Vec<u8>>, usize);
+
+    impl Read for Endless<'_> {
+        fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+            self.1 += 1;
+            let kept = self.0.lock().unwrap().len();
+            assert!(kept <= MESSAGES && (kept > 0 || self.1 == 1), "{kept} bytes at read {}", self.1);
+            let text = "\u{fc}".repeat(MESSAGES);
+            match self.1 {
+                1..9 => text.as_bytes().read(buffer),
+                9 => b"the end".as_slice().read(buffer),
+                _ => Ok(0),
+            }
+        }
+    }
+
+    #[test]
+    fn messages_without_a_line_end_are_kept_and_bounded() {
+        let kept = Mutex::new(Vec::new());
+        keep_messages(Endless(&kept, 0), &kept);
+        let kept = String::from_utf8(kept.into_inner().unwrap()).unwrap();
+        assert!(kept.ends_with("the end") && kept.len() > MESSAGES / 2, "{kept}");
+    }
 
     #[test]
     fn splits_commands_like_a_shell_and_parses_raw_formats() {

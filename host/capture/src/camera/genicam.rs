@@ -1,5 +1,6 @@
 //! GigE and USB3 Vision cameras through Aravis (SFNC names); feature `genicam`, as it needs `libaravis-dev` (Debian).
 
+mod payload;
 mod settings;
 
 use std::{
@@ -13,8 +14,8 @@ use std::{
 };
 
 use aravis::{
-    AcquisitionMode, Aravis, Buffer, BufferStatus, DeviceError, GvDevice, GvStream, PixelFormat, Stream,
-    glib::object::Cast, prelude::*,
+    AcquisitionMode, Aravis, Buffer, BufferPayloadType, BufferStatus, DeviceError, GvDevice, GvStream,
+    PixelFormat, Stream, glib::object::Cast, prelude::*,
 };
 use farnear_protocol::{
     message::{ShotRecord, TriggerMode},
@@ -242,18 +243,49 @@ impl GenicamCamera {
             BufferStatus::SizeMismatch => return Err(incomplete("it is larger than was announced".into())),
             other => return Err(incomplete(format!("{other:?}"))),
         }
-        let (width, height) = (buffer.image_width().max(0) as usize, buffer.image_height().max(0) as usize);
-        let format = buffer.image_pixel_format();
+        let (size, format, (padding, below), came) = match buffer.payload_type() {
+            BufferPayloadType::Image
+            | BufferPayloadType::ExtendedChunkData
+            | BufferPayloadType::Multipart => {
+                let size = (buffer.image_width(), buffer.image_height());
+                (size, buffer.image_pixel_format(), buffer.image_padding(), buffer.image_data())
+            }
+            // Its leader has neither size nor format.
+            BufferPayloadType::ChunkData => {
+                let (_, _, width, height) = self.camera.region().map_err(self.failed())?;
+                let format = self.camera.pixel_format().map_err(self.failed())?;
+                ((width, height), format, (0, 0), payload::received(buffer))
+            }
+            other => {
+                let reason = format!("its frames are {other:?}, expected images without compression");
+                return Err(unusable(&self.id, reason));
+            }
+        };
+        let (width, height) = (size.0.max(0) as usize, size.1.max(0) as usize);
         let layout = layout_of(format).ok_or_else(|| {
             unusable(
                 &self.id,
                 format!("its pixel format 0x{:08x} is not read: set one of Mono8 to Mono16", format.raw()),
             )
         })?;
-        let padding = usize::try_from(buffer.image_padding().0).unwrap_or(0);
-        let image = layout
-            .decode_padded(&buffer.image_data(), width, height, padding)
-            .map_err(|bad| incomplete(bad.to_string()))?;
+        let [padding, below] = [padding, below].map(|bytes| usize::try_from(bytes).unwrap_or(0));
+        let due = layout.frame_bytes(width, height).unwrap_or(usize::MAX);
+        let unlike =
+            || format!("{} bytes where {width}x{height} px of 0x{:08x} have {due}", came.len(), format.raw());
+        let bytes = match buffer.payload_type() {
+            BufferPayloadType::ChunkData => payload::image_chunk(&came, due).ok_or_else(|| {
+                unusable(&self.id, format!("none of its chunks is the image: {}", unlike()))
+            })?,
+            BufferPayloadType::Image | BufferPayloadType::Multipart
+                if !buffer.has_chunks()
+                    && payload::exceeds(came.len(), due.saturating_add(padding * height + below)) =>
+            {
+                return Err(incomplete(unlike()));
+            }
+            _ => came.as_slice(),
+        };
+        let image =
+            layout.decode_padded(bytes, width, height, padding).map_err(|bad| incomplete(bad.to_string()))?;
         Ok(Frame { image, stamp })
     }
 
@@ -399,7 +431,7 @@ impl Camera for GenicamCamera {
 
     fn watch(&mut self) -> Result<(), CameraError> {
         self.stop()?;
-        self.camera.clear_triggers().map_err(self.failed())?;
+        self.triggers_off()?;
         self.start()
     }
 

@@ -267,9 +267,15 @@ impl Pairing {
             if let (Some(by_camera), Some(off)) = (by_camera, off)
                 && off > self.jitter + drift
             {
-                let reason = format!(
-                    "its time stamp lies {by_camera:?} after that of the picture before it, their strobes {by_board:?} apart"
-                );
+                let back = last.time.zip(stamp.time).and_then(|(from, to)| from.checked_sub(to));
+                let reason = match back.filter(|back| !back.is_zero()) {
+                    Some(back) => format!(
+                        "its time stamp lies {back:?} before that of the picture before it, so the camera's clock has probably started again"
+                    ),
+                    None => format!(
+                        "its time stamp lies {by_camera:?} after that of the picture before it, their strobes {by_board:?} apart"
+                    ),
+                };
                 return Err(mispaired(camera, shot, reason));
             }
         }

@@ -86,6 +86,12 @@ impl Queue {
         !waiting.closed
     }
 
+    /// Drops the frames that came. An error stays, because no frame follows it.
+    fn drop_frames(&self) {
+        self.lock().frames.retain(Result::is_err);
+        self.changed.notify_all();
+    }
+
     /// `None` at the timeout, an error if no more can come.
     fn pop(&self, until: Instant) -> Result<Option<Result<Frame, CameraError>>, ()> {
         let mut waiting = self.lock();
@@ -181,9 +187,10 @@ impl Camera for SimCamera {
     }
 
     fn arm(&mut self, mode: TriggerMode, exposure: Micros) -> Result<(), CameraError> {
-        // After a reset of the board its number would be a later one. Old images in the queue are recognised by trigger number or
-        // time.
+        // After a reset of the board its number would be a later one. Old images that are still on their way are recognised by
+        // an earlier time or a lower number.
         (self.early, self.passed) = (None, None);
+        self.queue.drop_frames();
         let free = mode == TriggerMode::FreeRunning;
         if free {
             let period = Micros(exposure.0.saturating_add(BETWEEN_EXPOSURES_US));
@@ -225,7 +232,7 @@ impl Camera for SimCamera {
                 0
             } else if shot_id == FREE_RUNNING {
                 if exposure < shot.strobe_start { -1 } else { 1 }
-            } else if shot_id == wanted {
+            } else if shot_id == wanted || exposure < shot.strobe_start {
                 // From before a reset of the board, which numbers from 0 again.
                 -1
             } else {
@@ -316,6 +323,28 @@ mod tests {
         bytes.extend(header.to_bytes());
         bytes.extend(pixels.iter().flat_map(|pixel| pixel.to_le_bytes()));
         bytes
+    }
+
+    /// Images with higher numbers are older than the board's reset, after which it counts from 0 again.
+    #[test]
+    fn images_that_came_before_arming_or_were_exposed_earlier_are_passed_over() {
+        let image = |shot_id: u32, at_us: u64| {
+            let exposure = BoardMicros(at_us);
+            let header = FrameHeader { shot_id, exposure, width: 1, height: 1, bits: 8 };
+            [&header.length().to_le_bytes()[..], &header.to_bytes(), &[shot_id as u8, 0]].concat()
+        };
+        let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+        let mut camera = SimCamera::connect(&listener.local_addr().unwrap().to_string()).unwrap();
+        let (mut simulator, _) = listener.accept().unwrap();
+        simulator.write_all(&image(7, 9_000_000)).unwrap();
+        while camera.queue.lock().frames.is_empty() {
+            std::thread::yield_now();
+        }
+        camera.arm(TriggerMode::Hardware, Micros(1)).unwrap();
+        simulator.write_all(&[image(8, 100), image(0, 20_000)].concat()).unwrap();
+        let shot = crate::continuous::tests::frame(0, 0).record;
+        let shot = ShotRecord { strobe_start: BoardMicros(20_000), ..shot };
+        assert_eq!(camera.image(&shot, Duration::from_secs(20)).unwrap().pixels[[0, 0]], 0);
     }
 
     #[test]

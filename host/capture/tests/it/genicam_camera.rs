@@ -190,6 +190,68 @@ fn arming_ends_automatics_and_gamma_and_keeps_the_falling_edge() {
     assert_eq!(values(&mut camera, names), all(["Off", "1", "FallingEdge"]));
 }
 
+/// Opened by another program, which sets the falling edge.
+fn set_falling_edge() {
+    let other = aravis::Camera::new(Some(ID)).unwrap();
+    for (name, entry) in [("TriggerSelector", "FrameStart"), ("TriggerActivation", "FallingEdge")] {
+        other.set_string(name, entry).unwrap();
+    }
+}
+
+#[test]
+#[cfg_attr(not(fake_gige_camera), ignore = "needs arv-fake-gv-camera-0.8")]
+fn a_refused_trigger_source_does_not_change_the_edge() {
+    let source = "TriggerSource\"><EnumEntry Name=\"Line0\"><Value>0</Value></EnumEntry>\
+                  <pValue>TriggerSourceRegister</pValue></Enumeration><Enumeration Name=\"Old";
+    let (fake, _file) = described(&[
+        (
+            "<pValue>TriggerActivationRegister</pValue>",
+            "<EnumEntry Name=\"FallingEdge\"><Value>1</Value></EnumEntry>",
+        ),
+        ("TriggerSource\" NameSpace=\"Standard\"", source),
+    ]);
+    set_falling_edge();
+    let mut camera = fake.open();
+    let error = camera.arm(TriggerMode::Software, EXPOSURE).unwrap_err();
+    assert!(matches!(error, CameraError::Unusable { .. }), "{error:?}");
+    assert_eq!(values(&mut camera, ["TriggerActivation"]), [Some("FallingEdge".to_owned())]);
+}
+
+#[test]
+#[cfg_attr(not(fake_gige_camera), ignore = "needs arv-fake-gv-camera-0.8")]
+fn a_trigger_that_cannot_be_turned_off_and_is_not_on_is_left() {
+    let off = "<IntSwissKnife Name=\"OffIsThere\"><pVariable Name=\"SELECTED\">TriggerSelectorInteger</pVariable>\
+               <Formula>1 - SELECTED</Formula></IntSwissKnife>";
+    let mode = "TriggerMode\"><EnumEntry Name=\"Off\"><pIsAvailable>OffIsThere</pIsAvailable><Value>0</Value></EnumEntry>\
+                <EnumEntry Name=\"On\"><Value>1</Value></EnumEntry><pValue>TriggerModeRegister</pValue></Enumeration>\
+                <Enumeration Name=\"Old";
+    let (fake, _file) = described(&[
+        ("<Enumeration Name=\"TriggerMode\"", off),
+        ("TriggerMode\" NameSpace=\"Standard\"", mode),
+    ]);
+    let mut camera = fake.open();
+    camera.arm(TriggerMode::Software, EXPOSURE).unwrap();
+    camera.trigger(1, EXPOSURE).unwrap();
+    camera.image(&shot_at(1, Instant::now()), WAIT).unwrap();
+    camera.watch().unwrap();
+    next(&mut camera);
+}
+
+#[test]
+#[cfg_attr(not(fake_gige_camera), ignore = "needs arv-fake-gv-camera-0.8")]
+fn an_exposure_time_of_whole_microseconds_is_set() {
+    let whole = "<Integer Name=\"ExposureTime\"><pValue>ExposureTimeRegister</pValue><Min>20</Min><Max>500000</Max></Integer>\
+                 <IntReg Name=\"ExposureTimeRegister\"><Address>0x8020</Address><Length>4</Length><AccessMode>RW</AccessMode>\
+                 <pPort>Device</pPort><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></IntReg>";
+    let (fake, _file) = described(&[("<Float Name=\"ExposureTimeAbs\"", whole)]);
+    let mut camera = fake.open();
+    camera.arm(TriggerMode::Software, Micros(7_000)).unwrap();
+    assert_eq!(values(&mut camera, ["exposure_us"]), [Some("7000".to_owned())]);
+    assert_eq!(aravis::Camera::new(Some(ID)).unwrap().integer("ExposureTime").unwrap(), 7_000);
+    let refused = camera.set(&Setting::ExposureUs(10.0)).unwrap_err().to_string();
+    assert!(refused.contains("20 to 500000 us"), "{refused}");
+}
+
 #[test]
 #[cfg_attr(not(fake_gige_camera), ignore = "needs arv-fake-gv-camera-0.8")]
 fn negative_gains_steps_and_values_without_a_name() {

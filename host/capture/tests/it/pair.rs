@@ -82,6 +82,21 @@ fn names(folder: &Path) -> Vec<String> {
 }
 
 #[test]
+fn a_camera_that_changes_its_size_during_a_program_is_refused() {
+    let (client, _peer) = client();
+    let mut camera = Answering(|shot: &ShotRecord| {
+        let width = if shot.trigger_number == 0 { 4 } else { 2 };
+        Ok(Image::new(Array2::zeros((3, width)), 8))
+    });
+    // The second image is the dark one of the first.
+    let ambient = Exposures { subtract_ambient: true, ..exposures() };
+    let error = capture_pair(&client, &mut camera, &SENSOR, &ambient, &mut |_| {}).unwrap_err();
+    let refused =
+        matches!(error, CaptureError::Reformatted { trigger_number: 1, width: 2, first_width: 4, .. });
+    assert!(refused, "{error:?}");
+}
+
+#[test]
 fn homes_moves_exposes_and_writes_a_pair() {
     let (client, peer) = client();
     let mut messages = Vec::new();

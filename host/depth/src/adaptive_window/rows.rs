@@ -21,12 +21,11 @@ const BORDER_PX: usize = 14;
 /// Standard deviation of alpha by the operators' own error: 0.003 on noise-free slants.
 const FLOOR: f32 = 0.0026;
 /// Part of the windows' disagreement beyond noise by which the larger one's variance grows. Chosen on rendered spheres, cones
-/// and slants for an error over deviation of 0.9 to 1.25.
+/// and slants for an error over deviation of 0.8 to 1.25.
 const DOUBT: f32 = 0.5;
-/// `doubt` and `curvature` of [`Contrast`] for a learned lens, whose windows are larger. Where the surface curves evenly, a window
-/// of 41 px is off by 1.08 of its difference from one of 11 px, which the model's error may hide, and by its difference from its
-/// own mean over the window.
-const LEARNED: [f32; 2] = [1.0, 1.0];
+/// The same for a learned lens: a window of 41 px is off by 1.08 of its difference from one of 11 px where the surface curves
+/// evenly.
+const LEARNED_DOUBT: f32 = 1.0;
 /// Standard deviation of alpha from which a window tells nothing about the surface.
 const UNINFORMATIVE: f32 = 0.045;
 /// Standard deviation of alpha, at alpha = 0, that is certain enough.
@@ -150,9 +149,9 @@ impl<'a> Tile<'a> {
             agreement: (compared > 0).then(|| {
                 // The model error of a learned lens must not count as a depth step.
                 let tolerance = job.optics.stage().map_or(0.0, |stage| stage.window_tolerance as f32).powi(2);
-                let [doubt, curvature] = if job.optics.stage().is_some() { LEARNED } else { [DOUBT, 0.0] };
+                let doubt = if job.optics.stage().is_some() { LEARNED_DOUBT } else { DOUBT };
                 let largest = UNINFORMATIVE.powi(2) + tolerance;
-                let of = Contrast { gain: variance_gain, tolerance, largest, doubt, curvature };
+                let of = Contrast { gain: variance_gain, tolerance, largest, doubt };
                 Agreement::new(2 * compared + 1, wide, of)
             }),
             alpha: Plane::new(WAITING, wide),

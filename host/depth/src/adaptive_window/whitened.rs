@@ -8,7 +8,7 @@
 //! noise, which enters both, does not bias `sum r u`. Only `u = U0 * p` is used. What noise adds to `sum r u` without U1 is
 //! removed from the sums (`Bank::of_noise`).
 //!
-//! A window of side w has a standard deviation within 6 % of the bound for unknown texture (`docs/accuracy.md`):
+//! A window of side w has a standard deviation within 6 % of the bound for unknown texture (`docs/method.md`):
 //! `1 / (w sqrt J)`, `J = mean over frequencies of P D^2 / (s^2 (H1^2 + H2^2))`, `D = H1 H2' - H2 H1'`, P the texture's
 //! power, s^2 the noise's. Cost of [`Whitened::design`]: 153 frequencies x 13 depths, 40 unknowns, 1 to 2 ms; at run time
 //! five 7x7 kernels.

@@ -212,13 +212,14 @@ fn sobel(a: &Around) -> [f32; 2] {
     ]
 }
 
-/// Least squares of `c0 x + c1 y + c2 x^2 + c3 y^2` over the neighbourhood.
+/// Sum of the magnitudes of c0 to c3 of the least squares of `c + c0 x + c1 y + c2 x^2 + c3 y^2` over the neighbourhood. Without c, as
+/// published, c2 and c3 would contain the brightness.
 fn quadratic(a: &Around) -> f32 {
     let columns = [0, 1, 2].map(|x| a[0][x] + a[1][x] + a[2][x]);
     let rows = [0, 1, 2].map(|y| a[y].iter().sum::<f32>());
     let [x2, y2] = [columns[0] + columns[2], rows[0] + rows[2]];
     let slopes = ((columns[2] - columns[0]).abs() + (rows[2] - rows[0]).abs()) / 6.0;
-    // Of both squares over all nine pixels; their sum of grey values enters with the constant that is left out.
+    // The squares have a mean of 2 / 3 over the nine pixels.
     let all: f32 = rows.iter().sum();
     slopes + [x2, y2].map(|sum| (0.5 * sum - all / 3.0).abs()).iter().sum::<f32>()
 }

@@ -15,10 +15,10 @@ const AGREEMENT: f64 = 0.02;
 pub struct LensSection {
     /// Focal length F.
     pub focal_length_mm: f64,
-    /// Diameter 2a of the telecentric aperture.
+    /// Diameter of the aperture.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub aperture_mm: Option<f64>,
-    /// f-number `Fe = F / (2a)`.
+    /// f-number, the focal length over the diameter of the aperture.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub f_number: Option<f64>,
     /// Whether the lens is telecentric on the image side, so that moving the sensor changes neither the magnification nor the

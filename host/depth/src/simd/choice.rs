@@ -40,8 +40,6 @@ pub(crate) struct Contrast {
     pub largest: f32,
     /// Part of the difference's excess over noise by which the larger window's variance grows.
     pub doubt: f32,
-    /// Part of the surface's curvature over the larger window, beyond noise, by which that variance grows.
-    pub curvature: f32,
 }
 
 /// Largest counted squared difference, relative to the variance.
@@ -120,7 +118,8 @@ fn decide_generic<L: Lanes>(
         // An infinite variance times 0 is NaN.
         let apart = (of_small[x].min(f32::MAX) * (mean - FLAT) + mean * tolerated).max(0.0);
         let curved = (curved * curved / factor - of_large[x]).max(0.0);
-        let widened = of_large[x] + of.doubt * apart + of.curvature * curved;
+        // On an evenly curved surface the larger window is off by its difference from its own mean over the window.
+        let widened = of_large[x] + of.doubt * apart + curved;
         let grown = of_small[x] * mean.min(LARGEST_GROWTH);
         alpha[x] = if flat { large[x] } else { small[x] };
         variance[x] = if flat { widened } else { grown };
@@ -135,13 +134,7 @@ mod tests {
     /// A plane, and a step of 0.2 in the middle, seen by windows with a variance of 1e-3 and 1e-4.
     #[test]
     fn the_larger_window_counts_where_the_surface_is_flat() {
-        let of = Contrast {
-            gain: [1.0, 0.0, 0.0, 0.0],
-            tolerance: 0.0,
-            largest: 2e-3,
-            doubt: 0.5,
-            curvature: 1.0,
-        };
+        let of = Contrast { gain: [1.0, 0.0, 0.0, 0.0], tolerance: 0.0, largest: 2e-3, doubt: 0.5 };
         for backend in Backend::available() {
             let small = [[0.13, 0.30, 0.3], [1e-3, 1e-3, f32::NAN]];
             let large = [[0.11, 0.20, 0.2], [1e-4; 3]];

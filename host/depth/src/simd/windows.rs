@@ -193,22 +193,6 @@ fn dimensionless_generic<L: Lanes>(
 }
 
 dispatch! {
-    /// Confidence by evidence, the square of `unit` over a deviation: `evidence / (1 + evidence)`; 0 unless that is finite.
-    fn evidence_row(unit: f32, deviation: &[f32], to: &mut [f32]) = evidence_generic
-}
-
-#[inline(always)]
-fn evidence_generic<L: Lanes>(unit: f32, deviation: &[f32], to: &mut [f32]) {
-    let width = to.len();
-    let deviation = &deviation[..width];
-    for x in 0..width {
-        let root = unit / deviation[x];
-        let evidence = root * root;
-        to[x] = if evidence < f32::INFINITY { evidence / (1.0 + evidence) } else { 0.0 };
-    }
-}
-
-dispatch! {
     fn add_products(a: &[f32], b: &[f32], sums: &mut [f32]) = add_products_generic
 }
 
@@ -310,12 +294,22 @@ pub(super) fn polynomial(gain: [f32; 4], x: f32) -> f32 {
 pub(crate) struct Believed {
     pub near_mm: f32,
     pub far_mm: f32,
-    /// Magnitude of the change of depth with alpha at alpha 0, mm.
-    pub slope_mm: f32,
+    pub focal_length_mm: f32,
+    /// [`Optics::steepness`](crate::optics::Optics::steepness).
+    pub steepness: f32,
     /// Standard deviation of alpha from which noise alone may have made a depth.
     pub largest_deviation: f32,
     /// Mean square of what the model leaves, relative to the noise, from which it does not hold.
     pub largest_misfit: f32,
+}
+
+impl Believed {
+    /// Magnitude of the change of depth with alpha at `depth_mm`, mm.
+    #[inline(always)]
+    pub fn slope_mm(self, depth_mm: f32) -> f32 {
+        let beyond = depth_mm - self.focal_length_mm;
+        self.steepness * (beyond * beyond)
+    }
 }
 
 dispatch! {
@@ -346,7 +340,8 @@ fn believe_generic<L: Lanes>(
     let (depth, confidence, deviation) =
         (&mut depth[..width], &mut confidence[..width], &mut deviation[..width]);
     for x in 0..width {
-        let [of_noise, of_alpha] = [noise_mm[x] / of.slope_mm, deviation[x] / of.slope_mm];
+        let slope_mm = of.slope_mm(depth[x]);
+        let [of_noise, of_alpha] = [noise_mm[x] / slope_mm, deviation[x] / slope_mm];
         let probability = probability(of_alpha / of.largest_deviation, misfit[x]);
         let in_range = (depth[x] >= of.near_mm) & (depth[x] <= of.far_mm);
         let explained = !(misfit[x] > of.largest_misfit) & !(of_alpha > 3.0 * of.largest_deviation);

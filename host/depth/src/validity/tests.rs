@@ -25,6 +25,14 @@ struct Case {
     settings: ValiditySettings,
 }
 
+fn outdoors() -> Optics {
+    let file: OpticsFile = toml::from_str(
+        "[lens]\nfocal_length_mm = 8.0\nf_number = 1.6\n[sensor]\npixel_um = 5.0\n[focus]\nfar_mm = 30000.0\nnear_mm = 1000.0\n",
+    )
+    .unwrap();
+    file.check().unwrap()
+}
+
 impl Case {
     /// Every pixel in the middle of the range, with a standard deviation of alpha of 0.01 by noise, which explains all.
     fn new(size: (usize, usize)) -> Self {
@@ -144,15 +152,32 @@ fn depths_are_valid_a_tenth_beyond_either_focus() {
     assert_eq!(validity.valid_fraction, 0.5);
 }
 
+/// A camera outdoors, whose depth changes with alpha 40 times as much near the far focus as in the middle of alpha.
+#[test]
+fn noise_of_alpha_is_judged_by_the_slope_at_its_depth() {
+    let mut case = Case::new((1, 3));
+    case.optics = outdoors();
+    let slopes = [-0.9, 0.0, 0.9].map(|alpha| case.optics.depth_per_alpha_mm(alpha).abs() as f32);
+    assert!(slopes[0] > 30.0 * slopes[1]);
+    for (at, alpha) in [-0.9, 0.0, 0.9].into_iter().enumerate() {
+        case.map.depth_mm[(0, at)] = case.optics.depth_mm(alpha) as f32;
+        case.estimate.deviation_mm[(0, at)] = 0.05 * slopes[at];
+    }
+    let (map, validity) = case.judged();
+    assert_eq!(validity.reasons, ndarray::array![[0, 0, 0]]);
+    let confidence = map.confidence[(0, 1)];
+    assert!(
+        map.confidence.iter().all(|of_other| (of_other / confidence - 1.0).abs() < 1e-3),
+        "{:?}",
+        map.confidence
+    );
+}
+
 /// The far focus of a camera outdoors: a tenth beyond it lies beyond infinity, where depths are negative.
 #[test]
 fn depths_are_valid_up_to_infinity() {
     let mut case = Case::new((1, 4));
-    let file: OpticsFile = toml::from_str(
-        "[lens]\nfocal_length_mm = 8.0\nf_number = 1.6\n[sensor]\npixel_um = 5.0\n[focus]\nfar_mm = 30000.0\nnear_mm = 1000.0\n",
-    )
-    .unwrap();
-    case.optics = file.check().unwrap();
+    case.optics = outdoors();
     let deviation_mm = 0.01 * case.slope_mm();
     case.estimate.deviation_mm.fill(deviation_mm);
     for (depth, alpha) in case.map.depth_mm.iter_mut().zip([-1.09, -1.0, 0.0, 1.11]) {
@@ -202,13 +227,14 @@ fn lost_pixels_are_counted_by_reason() {
     assert_eq!(lost_pixels(&Array2::zeros((3, 4))), []);
 }
 
-/// With a slope of 30 mm: 3.6 mm of noise, 10.8 mm with the model's error, misfit 60.
+/// With a slope of 30 mm at 900 mm: 3.6 mm of noise, 10.8 mm with the model's error, misfit 60.
 #[test]
 fn depths_are_believed_up_to_each_limit_and_no_further() {
     let range = Believed {
         far_mm: 950.0,
         near_mm: 880.0,
-        slope_mm: 30.0,
+        focal_length_mm: 50.0,
+        steepness: 30.0 / (850.0 * 850.0),
         largest_deviation: LARGEST_DEVIATION,
         largest_misfit: LARGEST_MISFIT,
     };

@@ -239,11 +239,7 @@ fn standard_errors_are_those_of_repetition() {
                 "{model}: {what}: spread {spread}, predicted {predicted}"
             );
         };
-        let k_of = |fit: &PsfFit| match fit.psf {
-            Psf::Gaussian { k } | Psf::Generalised { k, .. } => k,
-            _ => fit.width(),
-        };
-        check("k", fits.iter().map(k_of).collect(), fits[0].standard_error_k.unwrap());
+        check("k", fits.iter().map(PsfFit::width).collect(), fits[0].standard_error_k.unwrap());
         for i in 0..fits[0].otf.len() {
             let values = fits.iter().map(|fit| fit.otf[i].value).collect();
             check(&format!("OTF at {}", fits[0].otf[i].z), values, fits[0].otf[i].standard_error);
@@ -269,7 +265,8 @@ fn a_shift_and_another_psf_are_distinguished_from_noise() {
         assert_eq!(fit(&shifted, model).verdict(), Verdict::Unexplained, "{model}");
         let found = fit(&ready, model);
         assert_eq!(found.verdict(), Verdict::Good, "{model}");
-        assert!((found.width() - 0.4578).abs() < 0.002, "{model}: {}", found.width());
+        let width = (0.5 * found.psf.second_moment()).sqrt();
+        assert!((width - 0.4578).abs() < 0.002, "{model}: {width}");
     }
     // With few frequencies chance must not count as model error.
     for seed in 0..4 {

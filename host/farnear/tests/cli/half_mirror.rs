@@ -4,6 +4,7 @@ use std::{
     io::Write,
     net::TcpListener,
     thread::{self, JoinHandle},
+    time::Duration,
 };
 
 use farnear_protocol::{camera::FrameHeader, units::BoardMicros};
@@ -53,19 +54,20 @@ fn one_trigger_gives_a_pair_and_its_depth() {
     assert!(number(&compared, "rmse_mm") <= 1.06, "{compared}");
 }
 
-/// A camera with a single picture, of this trigger.
-fn camera_of(shot_id: u32) -> (String, JoinHandle<()>) {
+/// A camera that gives one picture again and again, of this trigger and time.
+fn camera_of(shot_id: u32, exposure: BoardMicros) -> (String, JoinHandle<()>) {
     let listener = TcpListener::bind("127.0.0.1:0").expect("loopback");
     let address = listener.local_addr().expect("an address").to_string();
     let served = thread::spawn(move || {
         let (mut client, _) = listener.accept().expect("a client");
-        let header = FrameHeader { shot_id, exposure: BoardMicros(5), width: 640, height: 480, bits: 8 };
+        let header = FrameHeader { shot_id, exposure, width: 640, height: 480, bits: 8 };
         let mut frame = header.length().to_le_bytes().to_vec();
         frame.extend(header.to_bytes());
         frame.extend(vec![0; 2 * 640 * 480]);
-        client.write_all(&frame).expect("open");
-        // Until the client disconnects.
-        let _ = std::io::copy(&mut client, &mut std::io::sink());
+        // Until the client disconnects. Pictures that come before the capture are dropped.
+        while client.write_all(&frame).is_ok() {
+            thread::sleep(Duration::from_millis(100));
+        }
     });
     (address, served)
 }
@@ -75,11 +77,11 @@ fn camera_of(shot_id: u32) -> (String, JoinHandle<()>) {
 fn an_image_of_another_trigger_is_rejected_with_both_numbers() {
     let folder = Folder::new();
     // The board's first exposure is 0: a later one, and one from before the counter wrapped.
-    for (came, phrases) in [
-        (5, ["camera 2 of 2", "skipped exposure 0", "the image of exposure 5"]),
-        (u32::MAX - 2, ["camera 2 of 2", "no image of exposure 0", "that of exposure 4294967293"]),
+    for (came, at, phrases) in [
+        (5, 60_000_000, ["camera 2 of 2", "skipped exposure 0", "the image of exposure 5"]),
+        (u32::MAX - 2, 5, ["camera 2 of 2", "no image of exposure 0", "that of exposure 4294967293"]),
     ] {
-        let (address, served) = camera_of(came);
+        let (address, served) = camera_of(came, BoardMicros(at));
         let out = folder.text("out");
         let arguments = ["--port", "sim", "--second-camera", &address, "--image-wait-s", "2", "--out", &out];
         fails(&mut capture(&arguments), 1, &phrases);

@@ -133,6 +133,15 @@ fn needs_more(bytes: &[u8], values: &[u8], options: DecoderOptions, to: ColorSpa
     again.is_ok_and(|again| again != values)
 }
 
+/// Whether what follows the pixels of a file, `size` bytes of them, is padding. A second line end or a comment before them counts as
+/// pixels, so the last pixels would remain.
+fn is_padding(file: &[u8], after: &[u8], size: usize) -> bool {
+    let before = file.len().checked_sub(after.len() + size).unwrap_or_default();
+    let (header, pixels) = file.split_at(before);
+    let is_shifted = pixels.starts_with(b"#") || header.ends_with(b"\r") && pixels.starts_with(b"\n");
+    after.is_empty() || !is_shifted && after.iter().all(|byte| byte.is_ascii_whitespace() || *byte == 0)
+}
+
 fn other(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     let format =
         image::guess_format(bytes).map_err(|_| "its first bytes match none of these formats".to_string())?;
@@ -186,6 +195,18 @@ fn other(bytes: &[u8]) -> Result<(Decoded, u8), String> {
         ImageFormat::Png => complete::png_grey_bits(bytes).map(|bits| (1 << bits) - 1),
         _ => None,
     };
+    // The decoder takes the samples of a PAM file without TUPLTYPE for 8 bits.
+    if matches!(values, Values::U8(_)) && largest.is_some_and(|largest| largest > 255) {
+        return Err("it is a PAM file of 16 bits without TUPLTYPE, which is not read: store it as PGM".into());
+    }
+    let size = width * height * channels * if matches!(values, Values::U8(_)) { 1 } else { 2 };
+    if format == ImageFormat::Pnm && !is_padding(bytes, after, size) {
+        return Err(format!(
+            "data follow its pixels ({} bytes): remove them, and comments and second line ends before the pixels, which would count as \
+             pixels",
+            after.len()
+        ));
+    }
     let colours = if channels < 3 { 1 } else { 3 };
     let coding_variance = 0.0;
     let decoded = Decoded { width, height, channels, colours, values, white_level, largest, coding_variance };

@@ -237,7 +237,7 @@ fn decode_page(file: impl Read + Seek, size: u64, page: &Page, signed: Signed) -
             return text;
         }
         if text.contains("no lzw end code") {
-            return "its LZW data have no end: copy the file again; if they still have none, write it again in the program that made it"
+            return "its LZW data have no end: copy the file again; if they still have none, store it uncompressed or with deflate"
                 .into();
         }
         format!("{text}; rewrite it, for instance with `tiffcp -c lzw`")

@@ -127,6 +127,8 @@ pub(crate) struct Directory {
     pub micro_manager: Option<String>,
     /// Tag 33629 of MetaMorph: planes behind this one, without directories.
     pub metamorph_planes: u64,
+    /// Tag 42112, `GDAL_METADATA`, in XML.
+    pub gdal: Option<String>,
     /// Tag 42113, `GDAL_NODATA`: the value of pixels without one.
     pub nodata: Option<String>,
 }
@@ -307,6 +309,7 @@ impl<'a, S: Source + ?Sized> File<'a, S> {
             339 => directory.sample_format = first(),
             32997 => directory.image_depth = first(),
             33629 => directory.metamorph_planes = count,
+            42112 => directory.gdal = text(),
             42113 => directory.nodata = text(),
             50706 => directory.is_dng = true,
             51123 => directory.micro_manager = text(),

@@ -118,10 +118,12 @@ pub fn ambiguity(sorted: &[PathBuf]) -> Option<String> {
     })
 }
 
-/// Two files whose names differ only in how a number is written: `z1` and `z01`, `z1` and `z1.0`.
+/// Two files whose names differ only in how a number is written: `z1` and `z01`, `z1` and `z1.0`. Where names state the focus, no
+/// other number counts: `z1_t3` and `z01_t4`.
 pub fn same_number(paths: &[PathBuf]) -> Option<[&PathBuf; 2]> {
     let (names, values) = read(paths);
     let decimal = values.map(|values| values.column);
+    let of_focus = focus(&names);
     let written = |(column, number): (usize, &Number)| {
         let text = number.text.trim_start_matches('0');
         let is_decimal = decimal == Some(column) && number.fraction().is_some();
@@ -130,7 +132,9 @@ pub fn same_number(paths: &[PathBuf]) -> Option<[&PathBuf; 2]> {
     };
     let mut seen = HashMap::new();
     names.iter().zip(paths).find_map(|(name, path)| {
-        let numbers: Vec<(bool, String)> = name.numbers.iter().enumerate().map(written).collect();
+        let all = name.numbers.iter().enumerate();
+        let compared = all.filter(|(column, _)| of_focus.is_none_or(|focus| focus == *column));
+        let numbers: Vec<(bool, String)> = compared.map(written).collect();
         let has_numbers = !numbers.is_empty();
         seen.insert((name.texts.clone(), numbers), path).filter(|_| has_numbers).map(|other| [other, path])
     })
@@ -201,6 +205,8 @@ mod tests {
             ["z01.tif", "z1.tif", "z2.tif"],
             ["z1.tif", "z1.0.tif", "z2.0.tif"],
             ["z1,0.tif", "z1.0.tif", "z2.0.tif"],
+            ["z1_t3.tif", "z01_t4.tif", "z2_t5.tif"],
+            ["z1um_3.tif", "z1.0um_4.tif", "z2.0um_5.tif"],
         ] {
             assert!(same_number(&sorted(&names)).is_some(), "{names:?}");
         }
@@ -209,6 +215,9 @@ mod tests {
             &["z-1.tif", "z0.tif", "z1.tif"],
             &["t1700000000123456789.tif", "t1700000000123456790.tif"],
             &["near.tif", "far.tif"],
+            &["exp2_far_t3.tif", "exp2_near_t4.tif"],
+            &["t3_z1.tif", "t03_z2.tif"],
+            &["c1_7.tif", "c01_8.tif"],
         ] {
             assert_eq!(same_number(&sorted(names)), None, "{names:?}");
         }

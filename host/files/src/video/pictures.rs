@@ -8,7 +8,7 @@ use std::{
 use super::{Pixels, VideoError, VideoFrame};
 use crate::{
     image_file::{self, ImageError, Reading},
-    order,
+    order::{self, composed},
 };
 
 /// Lower-case endings of pictures; other files are ignored, also .pbm, the masks that programs write next to pictures.
@@ -79,5 +79,5 @@ pub fn read(path: &Path, reading: Reading) -> Result<Pixels, VideoError> {
 }
 
 pub fn stem(path: &Path) -> String {
-    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+    composed(&path.file_stem().unwrap_or_default().to_string_lossy())
 }

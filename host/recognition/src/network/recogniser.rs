@@ -166,9 +166,7 @@ mod tests {
     #[test]
     fn limits_are_set_on_clips_varied_as_in_training() {
         let clips = |first: usize, people: usize| {
-            let mut clips = everyday::clips(first, people, Scaling::default());
-            clips.retain(|clip| ["walk", "lie down"].contains(&clip.activity.as_str()));
-            clips
+            everyday::clips_of(&["walk", "lie down"], first, people, Scaling::default())
         };
         // Twenty clips: one more than a limit needs.
         let (people, others) = (clips(0, 3), clips(9, 10));

@@ -20,20 +20,10 @@ pub struct NetworkSettings {
     pub passes: usize,
     /// Clips per step of the optimiser.
     pub batch: usize,
-    /// Initial learning rate.
-    pub rate: f32,
-    /// Weight decay, times the learning rate.
-    pub decay: f32,
     /// Least share of a clip's frames in a step, drawn up to 1. Motion is between the remaining frames.
     pub keep: f32,
     /// Random offset per component, constant over a clip, in spreads of the component.
     pub shift: f32,
-    /// Dropout share of the pooled values.
-    pub dropout: f32,
-    /// Random noise per number of a frame, in spreads of the number.
-    pub noise: f32,
-    /// Label smoothing (Szegedy et al., CVPR 2016).
-    pub smoothing: f32,
     /// Members of the ensemble.
     pub members: usize,
     /// Seed of all random numbers.
@@ -47,18 +37,24 @@ impl Default for NetworkSettings {
             reach: 0,
             passes: 30,
             batch: 64,
-            rate: 2e-3,
-            decay: 1e-2,
             keep: 1.0,
             shift: 0.0,
-            dropout: 0.3,
-            noise: 0.05,
-            smoothing: 0.1,
             members: 1,
             seed: 1,
         }
     }
 }
+
+/// Initial learning rate.
+const RATE: f32 = 2e-3;
+/// Weight decay, times the learning rate.
+const DECAY: f32 = 1e-2;
+/// Dropout share of the pooled values.
+const DROPOUT: f32 = 0.3;
+/// Random noise per number of a frame, in spreads of the number.
+const NOISE: f32 = 0.05;
+/// Label smoothing (Szegedy et al., CVPR 2016).
+const SMOOTHING: f32 = 0.1;
 
 struct Moments {
     first: Vec<f32>,
@@ -105,7 +101,6 @@ impl Learner {
 struct Step {
     number: i32,
     rate: f32,
-    decay: f32,
 }
 
 impl Step {
@@ -118,7 +113,7 @@ impl Step {
         const FIRST: f32 = 0.9;
         const SECOND: f32 = 0.999;
         let (first, second) = (1.0 - FIRST.powi(self.number), 1.0 - SECOND.powi(self.number));
-        let decay = if shrink { self.rate * self.decay } else { 0.0 };
+        let decay = if shrink { self.rate * DECAY } else { 0.0 };
         for (((value, gradient), m), v) in values.zip(&mut moments.first).zip(&mut moments.second) {
             *m = FIRST * *m + (1.0 - FIRST) * gradient;
             *v = SECOND * *v + (1.0 - SECOND) * gradient * gradient;
@@ -179,8 +174,8 @@ fn one_member(
         for chosen in order.chunks(settings.batch.max(1)) {
             number += 1;
             let share = number as f32 / steps.max(1) as f32;
-            let rate = settings.rate * (0.5 + 0.5 * (std::f32::consts::PI * share).cos());
-            let step = Step { number, rate, decay: settings.decay };
+            let rate = RATE * (0.5 + 0.5 * (std::f32::consts::PI * share).cos());
+            let step = Step { number, rate };
             let varied: Vec<Embedded> =
                 chosen.iter().map(|&clip| clips[clip].varied(settings, &scale.points, &mut rng)).collect();
             let seen: Vec<Array2<f32>> = varied.par_iter().map(|clip| scale.applied(vectors(clip))).collect();
@@ -230,7 +225,7 @@ fn one_step(
 ) {
     let parts: Vec<ArrayView2<f32>> = clips.iter().map(|clip| clip.view()).collect();
     let Ok(mut frames) = ndarray::concatenate(Axis(0), &parts) else { return };
-    if let Ok(normal) = Normal::new(0.0, settings.noise) {
+    if let Ok(normal) = Normal::new(0.0, NOISE) {
         frames.mapv_inplace(|v| v + normal.sample(rng));
     }
     let [first, second, third, last] = learners;
@@ -249,7 +244,7 @@ fn one_step(
     for (row, &(from, to)) in spans.iter().enumerate() {
         clip.row_mut(row).assign(&pooled(rows(&seen, from, to)));
     }
-    let keep = 1.0 - settings.dropout;
+    let keep = 1.0 - DROPOUT;
     let kept =
         Array2::from_shape_simple_fn(
             clip.dim(),
@@ -258,7 +253,7 @@ fn one_step(
     let dropped = &clip * &kept;
     let pattern = rectified(third.layer.apply(dropped.view()));
     let decision = last.layer.apply(pattern.view());
-    let gradient = cross_entropy(&decision, labels, settings.smoothing);
+    let gradient = cross_entropy(&decision, labels);
     let Some(mut gradient) = last.step(pattern.view(), &gradient, step, true) else { return };
     only_above_zero(&mut gradient, &pattern);
     let Some(gradient) = third.step(dropped.view(), &gradient, step, true) else { return };
@@ -299,15 +294,15 @@ fn to_neighbours(windows: ArrayView2<f32>, reach: usize) -> Array2<f32> {
     out
 }
 
-fn cross_entropy(decision: &Array2<f32>, labels: impl Iterator<Item = usize>, smoothing: f32) -> Array2<f32> {
+fn cross_entropy(decision: &Array2<f32>, labels: impl Iterator<Item = usize>) -> Array2<f32> {
     let (n, classes) = decision.dim();
     let mut gradient = decision.clone();
     for (mut row, label) in gradient.rows_mut().into_iter().zip(labels) {
         let best = row.iter().fold(f32::NEG_INFINITY, |m, v| m.max(*v));
         row.mapv_inplace(|v| (v - best).exp());
         let total = row.sum();
-        row.mapv_inplace(|v| v / total - smoothing / classes as f32);
-        row[label] -= 1.0 - smoothing;
+        row.mapv_inplace(|v| v / total - SMOOTHING / classes as f32);
+        row[label] -= 1.0 - SMOOTHING;
     }
     gradient / n as f32
 }

@@ -132,13 +132,18 @@ fn tremble(joints: &mut [Joints], rng: &mut ChaCha8Rng) {
 
 /// Clips of `people` people at all activities, once each, from any view. Subjects count from `first`.
 pub fn clips(first: usize, people: usize, scaling: Scaling) -> Vec<Clip> {
-    (0..people * ACTIVITIES.len())
-        .into_par_iter()
-        .map(|index| {
-            let (subject, activity) = (first + index / ACTIVITIES.len(), index % ACTIVITIES.len());
-            clip(subject, activity, scaling)
-        })
-        .collect()
+    let all: Vec<&str> = ACTIVITIES.iter().map(|(name, _)| *name).collect();
+    clips_of(&all, first, people, scaling)
+}
+
+/// [`clips`] of the named activities only.
+pub fn clips_of(names: &[&str], first: usize, people: usize, scaling: Scaling) -> Vec<Clip> {
+    let named = |activity: &usize| names.contains(&ACTIVITIES[*activity].0);
+    let activities: Vec<usize> = (0..ACTIVITIES.len()).filter(named).collect();
+    debug_assert_eq!(activities.len(), names.len(), "{names:?}");
+    let one =
+        |index: usize| clip(first + index / activities.len(), activities[index % activities.len()], scaling);
+    (0..people * activities.len()).into_par_iter().map(one).collect()
 }
 
 /// One clip; if a person is outside the image, the next camera is used.

@@ -19,10 +19,8 @@ const SHIPPED: [&[u8]; 4] = [
 ];
 
 fn few(first: usize, people: usize) -> Vec<Clip> {
-    let kept = ["walk", "jumping jack", "crouch", "lie down"];
-    let mut clips = everyday::clips(first, people, Scaling::default());
-    clips.retain(|clip| kept.contains(&clip.activity.as_str()));
-    clips
+    let names = ["walk", "jumping jack", "crouch", "lie down"];
+    everyday::clips_of(&names, first, people, Scaling::default())
 }
 
 fn right(model: &Recogniser, clips: &[Clip]) -> usize {
@@ -106,8 +104,7 @@ fn a_restricted_model_measures_the_outlier_score_for_the_activities_it_answers()
     let model = Recogniser::from_bytes(SHIPPED[0]).expect("whole");
     let names: Vec<String> = ["walk", "lie down"].map(str::to_owned).to_vec();
     let restricted = model.restricted_to(&names);
-    let mut clips = few(700_000, 6);
-    clips.retain(|clip| names.contains(&clip.activity));
+    let clips = everyday::clips_of(&["walk", "lie down"], 700_000, 6, Scaling::default());
     let mut sure = 0;
     for clip in &clips {
         let [all, few] = [&model, &restricted].map(|model| model.recognise(&clip.views).expect("fits"));
@@ -141,8 +138,7 @@ fn few_of(model: &Recogniser, shares: &[f32]) -> f32 {
 #[test]
 fn a_shipped_model_is_less_certain_of_an_activity_removed_from_its_answers() {
     let model = Recogniser::from_bytes(SHIPPED[0]).expect("whole");
-    let mut lying = few(700_000, 6);
-    lying.retain(|clip| clip.activity == "lie down");
+    let lying = everyday::clips_of(&["lie down"], 700_000, 6, Scaling::default());
     for clip in lying {
         let answer = model.recognise(&clip.views).expect("fits");
         let without = |activity| model.outlier_score_without(&answer, activity).expect("a network");

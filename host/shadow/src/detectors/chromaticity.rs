@@ -6,34 +6,22 @@ use ndarray::Array2;
 use super::images::{Images, hsv, hue_difference, rgb, window_means};
 use farnear_silhouettes::mask::Mask;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// Smallest value relative to the background.
-    pub darkest: f32,
-    pub lightest: f32,
+/// Value relative to the background.
+const DARKEST: f32 = 0.3;
+const LIGHTEST: f32 = 1.0;
+const WINDOW_RADIUS_PX: usize = 2;
+
+pub(super) struct Limits {
     /// Largest excess saturation over the background, 0 to 1.
     pub saturation: f32,
     pub hue_deg: f32,
     /// Below this saturation (0 to 1) hue is noise and ignored.
     pub least_saturation: f32,
-    pub window_radius_px: usize,
 }
 
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            darkest: 0.3,
-            lightest: 1.0,
-            saturation: 0.16,
-            hue_deg: 48.0,
-            least_saturation: 0.15,
-            window_radius_px: 2,
-        }
-    }
-}
+pub(super) const LIMITS: Limits = Limits { saturation: 0.16, hue_deg: 48.0, least_saturation: 0.15 };
 
-#[must_use]
-pub fn detect(images: &Images<'_>, settings: &Settings) -> Mask {
+pub(super) fn detect(images: &Images<'_>, limits: &Limits) -> Mask {
     let mut ratio = Array2::zeros(images.size());
     let mut differences = Array2::from_elem(images.size(), [0.0; 2]);
     for (at, _) in images.foreground.indexed_iter().filter(|&(_, &set)| set) {
@@ -41,16 +29,14 @@ pub fn detect(images: &Images<'_>, settings: &Settings) -> Mask {
         let [background_hue, background_saturation, background_value] = hsv(rgb(images.background, at));
         // Nothing is darker than a black background.
         ratio[at] = if background_value > 0.0 { value / background_value } else { f32::INFINITY };
-        let coloured = saturation.min(background_saturation) >= settings.least_saturation;
+        let coloured = saturation.min(background_saturation) >= limits.least_saturation;
         let hue = if coloured { hue_difference(hue, background_hue) } else { 0.0 };
         differences[at] = [saturation - background_saturation, hue];
     }
-    let means = window_means(&differences, images.foreground, settings.window_radius_px);
+    let means = window_means(&differences, images.foreground, WINDOW_RADIUS_PX);
     images.foreground_where(|at| {
         let [saturation, hue] = means[at];
-        (settings.darkest..=settings.lightest).contains(&ratio[at])
-            && saturation <= settings.saturation
-            && hue <= settings.hue_deg
+        (DARKEST..=LIGHTEST).contains(&ratio[at]) && saturation <= limits.saturation && hue <= limits.hue_deg
     })
 }
 
@@ -67,7 +53,7 @@ mod tests {
         let (frame, background) = (plain(frame), plain(background));
         let mask = Array2::from_elem((6, 6), true);
         let images = Images::new(frame.view(), background.view(), mask.view()).unwrap();
-        let found = detect(&images, &Settings::default());
+        let found = detect(&images, &LIMITS);
         assert!(found.iter().all(|&set| set == found[[0, 0]]));
         found[[0, 0]]
     }

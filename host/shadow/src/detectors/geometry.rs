@@ -17,34 +17,24 @@ use farnear_silhouettes::mask::{
     regions::{Connectivity, Region, regions},
 };
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// Body columns have at least this share of the tallest.
-    pub body_share: f32,
-    /// Lower share of the body's height used by the guess.
-    pub lower_share: f32,
-    pub widening: f32,
-    /// Threshold of the Gaussian, 1 at its centre.
-    pub threshold: f32,
-    pub smallest_region_px: usize,
-}
+/// Body columns have at least this share of the tallest.
+const BODY_SHARE: f32 = 0.5;
+/// Lower share of the body's height used by the guess.
+const LOWER_SHARE: f32 = 0.5;
+const WIDENING: f32 = 1.6;
+/// Threshold of the Gaussian, 1 at its centre.
+const THRESHOLD: f32 = 0.2;
+const SMALLEST_REGION_PX: usize = 50;
 
-impl Default for Settings {
-    fn default() -> Self {
-        Self { body_share: 0.5, lower_share: 0.5, widening: 1.6, threshold: 0.2, smallest_region_px: 50 }
-    }
-}
-
-#[must_use]
-pub fn detect(images: &Images<'_>, settings: &Settings) -> Mask {
+pub(super) fn detect(images: &Images<'_>) -> Mask {
     let grey = intensity(images.frame);
     let mut found = Mask::from_elem(images.size(), false);
     for region in regions(images.foreground, true, Connectivity::Eight) {
-        if region.area < settings.smallest_region_px {
+        if region.area < SMALLEST_REGION_PX {
             continue;
         }
-        if let Some(split) = Split::of(&region, settings) {
-            split.mark(&region, &grey, settings, &mut found);
+        if let Some(split) = Split::of(&region) {
+            split.mark(&region, &grey, &mut found);
         }
     }
     found
@@ -60,7 +50,7 @@ struct Split {
 
 impl Split {
     /// `None` if nothing leans out of the body.
-    fn of(region: &Region, settings: &Settings) -> Option<Self> {
+    fn of(region: &Region) -> Option<Self> {
         let bounds = region.bounds;
         let mut heights = vec![0_usize; bounds.width()];
         for run in &region.runs {
@@ -69,7 +59,7 @@ impl Split {
                 .for_each(|height| *height += 1);
         }
         let (peak, &tallest) = heights.iter().enumerate().max_by_key(|&(_, height)| height)?;
-        let tall = |height: &usize| *height as f32 >= settings.body_share * tallest as f32;
+        let tall = |height: &usize| *height as f32 >= BODY_SHARE * tallest as f32;
         let left = heights[..peak].iter().rposition(|height| !tall(height)).map_or(0, |at| at + 1);
         let right =
             heights[peak..].iter().position(|height| !tall(height)).map_or(heights.len(), |at| peak + at);
@@ -78,7 +68,7 @@ impl Split {
         let rows = region.runs.iter().filter(|run| run.start < body.1 && run.end > body.0).map(|run| run.row);
         let (top, bottom) =
             rows.fold((usize::MAX, 0), |(top, bottom), row| (top.min(row), bottom.max(row + 1)));
-        let first_row = bottom - (settings.lower_share * (bottom - top) as f32) as usize;
+        let first_row = bottom - (LOWER_SHARE * (bottom - top) as f32) as usize;
         let outside = |right_side: bool| -> usize {
             let runs = region.runs.iter().filter(|run| run.row >= first_row);
             runs.map(|run| {
@@ -98,14 +88,14 @@ impl Split {
         row >= self.first_row && if self.right { column >= self.body.1 } else { column < self.body.0 }
     }
 
-    fn mark(&self, region: &Region, grey: &Array2<f32>, settings: &Settings, found: &mut Mask) {
+    fn mark(&self, region: &Region, grey: &Array2<f32>, found: &mut Mask) {
         let pixels =
             || region.runs.iter().flat_map(|run| (run.start..run.end).map(|column| (run.row, column)));
         let mut moments = Moments::default();
         for (row, column) in pixels().filter(|&(row, column)| self.guesses(row, column)) {
             moments.add([column as f64, row as f64, f64::from(grey[[row, column]])]);
         }
-        let Some(model) = moments.gaussian(f64::from(settings.widening)) else { return };
+        let Some(model) = moments.gaussian(f64::from(WIDENING)) else { return };
         for (row, column) in pixels() {
             // No shadow on the far side of the body or above its lower part.
             let beyond = if self.right { column < self.body.0 } else { column >= self.body.1 };
@@ -113,7 +103,7 @@ impl Split {
                 continue;
             }
             let fit = model.value([column as f64, row as f64, f64::from(grey[[row, column]])]);
-            found[[row, column]] = fit >= f64::from(settings.threshold);
+            found[[row, column]] = fit >= f64::from(THRESHOLD);
         }
     }
 }
@@ -193,7 +183,7 @@ mod tests {
         for columns in [90..140, 20..70] {
             let (frame, mask) = scene(columns.clone());
             let images = Images::new(frame.view(), frame.view(), mask.view()).unwrap();
-            let found = detect(&images, &Settings::default());
+            let found = detect(&images);
             let count = |rows: std::ops::Range<usize>, columns: std::ops::Range<usize>| {
                 found.slice(s![rows, columns]).iter().filter(|&&set| set).count()
             };
@@ -206,7 +196,7 @@ mod tests {
     fn keeps_a_body_without_shadow() {
         let (frame, mask) = scene(80..80);
         let images = Images::new(frame.view(), frame.view(), mask.view()).unwrap();
-        assert!(detect(&images, &Settings::default()).iter().all(|&set| !set));
+        assert!(detect(&images).iter().all(|&set| !set));
     }
 
     #[test]

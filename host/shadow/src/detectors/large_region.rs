@@ -20,68 +20,46 @@ use farnear_silhouettes::mask::{
     regions::{Connectivity, regions},
 };
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    pub candidates: chromaticity::Settings,
-    /// Smallest compared gradient, grey levels per pixel, in frame or background.
-    pub least_gradient: f32,
-    /// Largest angle between gradients of equal direction.
-    pub largest_angle_deg: f32,
-    /// Smallest share c of matching gradients.
-    pub least_share: f32,
-    /// Excess gradient over the shaded background that splits regions, grey levels per pixel.
-    pub edge_gradient: f32,
-    pub fewest_gradients: usize,
-}
+const CANDIDATES: chromaticity::Limits =
+    chromaticity::Limits { saturation: 0.3, hue_deg: 76.0, least_saturation: 0.2 };
+/// Smallest compared gradient, grey levels per pixel, in frame or background.
+const LEAST_GRADIENT: f32 = 4.0;
+/// Largest angle between gradients of equal direction.
+const LARGEST_ANGLE_DEG: f32 = 30.0;
+/// Smallest share c of matching gradients.
+const LEAST_SHARE: f32 = 0.45;
+/// Excess gradient over the shaded background that splits regions, grey levels per pixel.
+const EDGE_GRADIENT: f32 = 12.0;
+const FEWEST_GRADIENTS: usize = 12;
 
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            candidates: chromaticity::Settings {
-                saturation: 0.3,
-                hue_deg: 76.0,
-                least_saturation: 0.2,
-                ..chromaticity::Settings::default()
-            },
-            least_gradient: 4.0,
-            largest_angle_deg: 30.0,
-            least_share: 0.45,
-            edge_gradient: 12.0,
-            fewest_gradients: 12,
-        }
-    }
-}
-
-#[must_use]
-pub fn detect(images: &Images<'_>, settings: &Settings) -> Mask {
-    let candidates = chromaticity::detect(images, &settings.candidates);
+pub(super) fn detect(images: &Images<'_>) -> Mask {
+    let candidates = chromaticity::detect(images, &CANDIDATES);
     let (frame, background) = (intensity(images.frame), intensity(images.background));
     let (frame_slope, background_slope) = (gradient(&frame), gradient(&background));
     let shade = |at: (usize, usize)| frame[at] / background[at].max(1.0);
     let size = |slope: [f32; 2]| slope[0].hypot(slope[1]);
     let edges = Array2::from_shape_fn(images.size(), |at| {
-        candidates[at]
-            && size(frame_slope[at]) - shade(at) * size(background_slope[at]) > settings.edge_gradient
+        candidates[at] && size(frame_slope[at]) - shade(at) * size(background_slope[at]) > EDGE_GRADIENT
     });
     let parted = Array2::from_shape_fn(images.size(), |at| candidates[at] && !edges[at]);
 
     // At the foreground's outline the difference is the outline itself.
     let inside = BitMask::pack(images.foreground).eroded(1).unpack();
-    let least_cosine = settings.largest_angle_deg.to_radians().cos();
+    let least_cosine = LARGEST_ANGLE_DEG.to_radians().cos();
     let mut shadow = Mask::from_elem(images.size(), false);
     for region in regions(parted.view(), true, Connectivity::Four) {
         let (mut worthy, mut alike) = (0_usize, 0_usize);
         for at in region.runs.iter().flat_map(|run| (run.start..run.end).map(|column| (run.row, column))) {
             let (f, b) = (frame_slope[at], background_slope[at]);
             // The background's gradient is scaled to this shade, so that darkness does not hide texture.
-            if !inside[at] || size(f).max(shade(at) * size(b)) < settings.least_gradient * shade(at) {
+            if !inside[at] || size(f).max(shade(at) * size(b)) < LEAST_GRADIENT * shade(at) {
                 continue;
             }
             worthy += 1;
             let cosine = (f[0] * b[0] + f[1] * b[1]) / (size(f) * size(b)).max(f32::MIN_POSITIVE);
             alike += usize::from(cosine >= least_cosine);
         }
-        if worthy < settings.fewest_gradients || alike as f32 >= settings.least_share * worthy as f32 {
+        if worthy < FEWEST_GRADIENTS || alike as f32 >= LEAST_SHARE * worthy as f32 {
             region.paint(&mut shadow, true);
         }
     }
@@ -121,7 +99,7 @@ mod tests {
         mask.slice_mut(s![10..50, 5..30]).fill(true);
         mask.slice_mut(s![10..50, 45..70]).fill(true);
         let images = Images::new(frame.view(), background.view(), mask.view()).unwrap();
-        let found = detect(&images, &Settings::default());
+        let found = detect(&images);
         let count =
             |columns: std::ops::Range<usize>| found.slice(s![.., columns]).iter().filter(|&&set| set).count();
         assert!(count(5..30) > 900, "{} of 1000 shadow pixels", count(5..30));

@@ -12,37 +12,19 @@ use ndarray::Array2;
 use super::images::{Images, gradient, intensity, rgb};
 use farnear_silhouettes::mask::Mask;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// Smallest proposed brightness relative to the background.
-    pub darkest: f32,
-    pub lightest: f32,
-    /// Largest angle between the frame's and the background's colour.
-    pub cone_deg: f32,
-    /// Gradient difference at confidence exp(-1/2), grey levels per pixel.
-    pub gradient_scale: f32,
-    /// Share of the mixture replaced per frame, 0 to 1.
-    pub learning_rate: f32,
-    /// Distance within which a pixel belongs to a component, standard deviations.
-    pub reach_sd: f32,
-    /// Smallest weight of a shadow component.
-    pub least_weight: f32,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            darkest: 0.2,
-            lightest: 0.95,
-            cone_deg: 12.0,
-            gradient_scale: 8.0,
-            learning_rate: 0.1,
-            reach_sd: 2.0,
-            least_weight: 0.25,
-        }
-    }
-}
-
+/// Proposed brightness relative to the background.
+const DARKEST: f32 = 0.2;
+const LIGHTEST: f32 = 0.95;
+/// Largest angle between the frame's and the background's colour.
+const CONE_DEG: f32 = 12.0;
+/// Gradient difference at confidence exp(-1/2), grey levels per pixel.
+const GRADIENT_SCALE: f32 = 8.0;
+/// Share of the mixture replaced per frame, 0 to 1.
+const LEARNING_RATE: f32 = 0.1;
+/// Distance within which a pixel belongs to a component, standard deviations.
+const REACH_SD: f32 = 2.0;
+/// Smallest weight of a shadow component.
+const LEAST_WEIGHT: f32 = 0.25;
 const COMPONENTS: usize = 5;
 /// Standard deviation of a new component, radians, and lower limit.
 const FIRST_SD: f32 = 0.12;
@@ -64,18 +46,12 @@ impl Component {
     }
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Physical {
-    settings: Settings,
     mixture: Vec<Component>,
 }
 
 impl Physical {
-    #[must_use]
-    pub fn new(settings: Settings) -> Self {
-        Self { settings, mixture: Vec::new() }
-    }
-
     pub fn detect(&mut self, images: &Images<'_>) -> Mask {
         let (frame, background) = (intensity(images.frame), intensity(images.background));
         let (frame_slope, background_slope) = (gradient(&frame), gradient(&background));
@@ -83,7 +59,7 @@ impl Physical {
         let mut samples = Vec::new();
         for (at, _) in images.foreground.indexed_iter().filter(|&(_, &set)| set) {
             let (f, b) = (rgb(images.frame, at), rgb(images.background, at));
-            if !self.weakly_shadow(f, b) {
+            if !Self::weakly_shadow(f, b) {
                 continue;
             }
             let angles = direction(f, b);
@@ -92,27 +68,26 @@ impl Physical {
             let shade = frame[at] / background[at].max(1.0);
             let [across, down] =
                 [0, 1].map(|axis| frame_slope[at][axis] - shade * background_slope[at][axis]);
-            let excess = (across * across + down * down) / self.settings.gradient_scale.powi(2);
+            let excess = (across * across + down * down) / GRADIENT_SCALE.powi(2);
             samples.push((angles, (-0.5 * excess).exp()));
         }
         self.learn(&samples);
         images.foreground_where(|at| proposed[at].is_some_and(|angles| self.is_shadow(angles)))
     }
 
-    fn weakly_shadow(&self, frame: [f32; 3], background: [f32; 3]) -> bool {
+    fn weakly_shadow(frame: [f32; 3], background: [f32; 3]) -> bool {
         let dot = |a: [f32; 3], b: [f32; 3]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f32>();
         let (along, length) = (dot(frame, background), dot(background, background));
         let norm = (length * dot(frame, frame)).sqrt();
         norm > 0.0
-            && (self.settings.darkest..=self.settings.lightest).contains(&(along / length))
-            && along >= norm * self.settings.cone_deg.to_radians().cos()
+            && (DARKEST..=LIGHTEST).contains(&(along / length))
+            && along >= norm * CONE_DEG.to_radians().cos()
     }
 
     fn is_shadow(&self, angles: [f32; 2]) -> bool {
-        self.mixture.iter().any(|component| {
-            component.weight >= self.settings.least_weight
-                && component.distance_sd(angles) <= self.settings.reach_sd
-        })
+        self.mixture
+            .iter()
+            .any(|component| component.weight >= LEAST_WEIGHT && component.distance_sd(angles) <= REACH_SD)
     }
 
     /// One update: each sample joins the nearest component within reach; the rest start a new one.
@@ -134,7 +109,7 @@ impl Physical {
                 .enumerate()
                 .map(|(index, component)| (index, component.distance_sd(angles)))
                 .min_by(|a, b| a.1.total_cmp(&b.1))
-                .filter(|&(_, distance)| distance <= self.settings.reach_sd);
+                .filter(|&(_, distance)| distance <= REACH_SD);
             let (index, squared) = nearest.map_or((self.mixture.len(), 0.0), |(index, distance)| {
                 (index, distance * distance * self.mixture[index].variance)
             });
@@ -145,12 +120,12 @@ impl Physical {
                 *total += confidence * angle;
             }
         }
-        let rate = self.settings.learning_rate;
         for (component, &(confidence, angles, squared)) in self.mixture.iter_mut().zip(&sums) {
-            component.weight += rate * (confidence / evidence - component.weight);
+            component.weight += LEARNING_RATE * (confidence / evidence - component.weight);
             if confidence > 0.0 {
                 // New and old evidence are weighted by their shares of the weight.
-                let step = (rate * confidence / evidence / component.weight.max(rate)).min(1.0);
+                let step =
+                    (LEARNING_RATE * confidence / evidence / component.weight.max(LEARNING_RATE)).min(1.0);
                 for (mean, total) in component.mean.iter_mut().zip(angles) {
                     *mean += step * (total / confidence - *mean);
                 }
@@ -166,7 +141,7 @@ impl Physical {
                 self.mixture.pop();
             }
             let mean = strays.1.map(|total| total / strays.0);
-            self.mixture.push(Component { weight: rate, mean, variance: FIRST_SD * FIRST_SD });
+            self.mixture.push(Component { weight: LEARNING_RATE, mean, variance: FIRST_SD * FIRST_SD });
         }
         let total: f32 = self.mixture.iter().map(|component| component.weight).sum();
         self.mixture.iter_mut().for_each(|component| component.weight /= total);
@@ -220,7 +195,7 @@ mod tests {
 
     #[test]
     fn ignores_too_little_evidence() {
-        let mut detector = Physical::new(Settings::default());
+        let mut detector = Physical::default();
         detector.learn(&[([0.8, 0.9], 1.0); 5]);
         assert!(detector.mixture.is_empty());
         detector.learn(&[([0.8, 0.9], 1.0); 50]);
@@ -229,7 +204,7 @@ mod tests {
 
     #[test]
     fn a_component_has_the_weighted_mean_and_spread_of_its_samples() {
-        let mut detector = Physical::new(Settings::default());
+        let mut detector = Physical::default();
         let samples: Vec<_> =
             (0..50).map(|i| if i < 25 { ([1.0, 1.0], 3.0) } else { ([1.2, 1.0], 2.0) }).collect();
         // 0.9 to the power of 200 is nothing.
@@ -251,7 +226,7 @@ mod tests {
         let samples = |of_second| -> Vec<_> {
             (0..50).map(|i| (if i < of_second { second } else { first }, 1.0)).collect()
         };
-        let mut detector = Physical::new(Settings::default());
+        let mut detector = Physical::default();
         (0..50).for_each(|_| detector.learn(&samples(5)));
         assert!(detector.is_shadow(first) && detector.mixture.len() == 1, "a tenth may be noise");
         (0..50).for_each(|_| detector.learn(&samples(20)));
@@ -264,7 +239,7 @@ mod tests {
 
     #[test]
     fn the_weakest_component_makes_room_for_a_new_one() {
-        let mut detector = Physical::new(Settings::default());
+        let mut detector = Physical::default();
         for light in 0..=COMPONENTS {
             // Ever fewer of the first; 1 apart, far beyond the reach of two standard deviations.
             let samples: Vec<_> =

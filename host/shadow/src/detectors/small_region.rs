@@ -12,26 +12,16 @@ use ndarray::{Array2, ArrayView2};
 use super::images::{Images, intensity, window_means};
 use farnear_silhouettes::mask::{Mask, bits::BitMask};
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// Smallest intensity of a candidate relative to the background.
-    pub darkest: f32,
-    pub lightest: f32,
-    /// Largest distance relative to the background's length.
-    pub distance: f32,
-    /// Background length without texture, relative to the local mean; such ground counts as equal.
-    pub smooth: f32,
-    /// Camera noise, standard deviation in grey levels (mean of three channels).
-    pub noise_sd: f32,
-    pub region_radius_px: usize,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self { darkest: 0.2, lightest: 0.95, distance: 0.7, smooth: 0.01, noise_sd: 1.5, region_radius_px: 3 }
-    }
-}
-
+/// Intensity of a candidate relative to the background.
+const DARKEST: f32 = 0.2;
+const LIGHTEST: f32 = 0.95;
+/// Largest distance relative to the background's length.
+const DISTANCE: f32 = 0.7;
+/// Background length without texture, relative to the local mean; such ground counts as equal.
+const SMOOTH: f32 = 0.01;
+/// Camera noise, standard deviation in grey levels (mean of three channels).
+const NOISE_SD: f32 = 1.5;
+const REGION_RADIUS_PX: usize = 3;
 const RADIUS: usize = 4;
 const SIDE: usize = 2 * RADIUS + 1;
 const WAVELENGTHS_PX: [f32; 2] = [4.0, 8.0];
@@ -41,13 +31,12 @@ const SD_PX: f32 = 2.0;
 
 type Window = [[f32; SIDE]; SIDE];
 
-#[must_use]
-pub fn detect(images: &Images<'_>, settings: &Settings) -> Mask {
+pub(super) fn detect(images: &Images<'_>) -> Mask {
     let (frame, background) = (intensity(images.frame), intensity(images.background));
     let bank = gabor_bank();
     let candidates = images.foreground_where(|at| {
         let ratio = frame[at] / background[at].max(f32::MIN_POSITIVE);
-        (settings.darkest..=settings.lightest).contains(&ratio)
+        (DARKEST..=LIGHTEST).contains(&ratio)
     });
     // At a soft outline the gain varies; inner pixels decide.
     let inside = BitMask::pack(images.foreground).eroded(1).unpack();
@@ -56,14 +45,14 @@ pub fn detect(images: &Images<'_>, settings: &Settings) -> Mask {
         let (shaded, shaded_mean) = project(&frame, inside.view(), at, &bank);
         let (lit, _) = project(&background, inside.view(), at, &bank);
         let apart: f32 = shaded.iter().zip(&lit).map(|(a, b)| (a - b).powi(2)).sum();
-        let noise = (settings.noise_sd / shaded_mean).powi(2) * bank.energy;
+        let noise = (NOISE_SD / shaded_mean).powi(2) * bank.energy;
         squares[at] = [apart - noise, lit.iter().map(|value| value * value).sum(), 1.0];
     }
-    let means = window_means(&squares, candidates.view(), settings.region_radius_px);
+    let means = window_means(&squares, candidates.view(), REGION_RADIUS_PX);
     images.foreground_where(|at| {
         // The share of valid pixels is in all three and cancels.
         let [apart, length, speaking] = means[at];
-        let limit = settings.distance.powi(2) * length + settings.smooth.powi(2) * speaking;
+        let limit = DISTANCE.powi(2) * length + SMOOTH.powi(2) * speaking;
         candidates[at] && speaking > 0.0 && apart <= limit
     })
 }
@@ -214,7 +203,7 @@ mod tests {
         for (gain, turned, share) in [(0.5, false, 1.0), (0.5, true, 0.0), (1.2, false, 0.0)] {
             let frame = image(gain, turned);
             let images = Images::new(frame.view(), background.view(), mask.view()).unwrap();
-            let found = detect(&images, &Settings::default());
+            let found = detect(&images);
             let found = found.iter().filter(|&&set| set).count() as f32 / 576.0;
             assert!((found - share).abs() < 0.02, "gain {gain}, turned {turned}: {found}");
         }

@@ -7,25 +7,22 @@ use farnear_shadow::synthetic::{
     scene::{Kind, Scene, scene},
 };
 use ndarray::Array2;
-use std::sync::OnceLock;
+use std::sync::LazyLock;
 
-fn scenes() -> &'static [(Scene, Pictures)] {
-    static SCENES: OnceLock<Vec<(Scene, Pictures)>> = OnceLock::new();
-    SCENES.get_or_init(|| {
-        let made = |seed| {
-            let scene = scene(Kind::Standard, seed);
-            let pictures = colour_in(scene.truth().view(), seed);
-            (scene, pictures)
-        };
-        (0..10).map(made).collect()
-    })
-}
+static SCENES: LazyLock<Vec<(Scene, Pictures)>> = LazyLock::new(|| {
+    let made = |seed| {
+        let scene = scene(Kind::Standard, seed);
+        let pictures = colour_in(scene.truth().view(), seed);
+        (scene, pictures)
+    };
+    (0..10).map(made).collect()
+});
 
 /// Score over the scenes; the foreground is body and shadow.
 fn score(method: Method) -> ShadowScore {
     let mut total = ShadowScore::default();
     let mut detector = Detector::new(method);
-    for (scene, pictures) in scenes() {
+    for (scene, pictures) in SCENES.iter() {
         let (truth, foreground) = (scene.truth(), scene.silhouette.view());
         let images = Images::new(pictures.frame.view(), pictures.background.view(), foreground);
         let shadow = detector.detect(&images.expect("one shape"));

@@ -8,7 +8,7 @@
 //! mean     += o (rate / weight) (x - mean)
 //! variance += o (rate / weight) (|x - mean|^2 - variance)
 //! ```
-//! The owner is the heaviest component within `component_threshold`. One pass of neighbour exchanges keeps
+//! The owner is the heaviest component within `COMPONENT_THRESHOLD`. One pass of neighbour exchanges keeps
 //! components sorted by weight, because at most one has grown. A tile of a component holds weight, variance
 //! and channel means of [`TILE`] pixels; unused components are never touched. About 10 floating-point
 //! operations and one division per pixel, component in use and channel.
@@ -17,7 +17,22 @@ use std::array::from_fn;
 
 use pulp::{Simd, WithSimd};
 
-use super::settings::Settings;
+use super::model::Settings;
+
+/// Most components of a pixel.
+pub const COMPONENTS: usize = 5;
+// The papers' values (three and four standard deviations) and common variances, squared grey levels.
+/// Squared Mahalanobis distance of background.
+const BACKGROUND_THRESHOLD: f32 = 16.0;
+/// Squared Mahalanobis distance of a component; beyond it a new one is created.
+const COMPONENT_THRESHOLD: f32 = 9.0;
+/// Share of the data explained by background components, 1 - c_f (2006, equation 9).
+const BACKGROUND_SHARE: f32 = 0.9;
+/// Weight removed from every component by the Dirichlet prior, c_T (2004, equation 14).
+const COMPLEXITY_PRIOR: f32 = 0.05;
+pub const INITIAL_VARIANCE: f32 = 15.0;
+const MIN_VARIANCE: f32 = 4.0;
+const MAX_VARIANCE: f32 = 75.0;
 
 /// Pixels per tile: the widest f32 vector (AVX-512).
 pub const TILE: usize = 16;
@@ -41,8 +56,8 @@ pub const fn mean_offset(channel: usize) -> usize {
     (MEAN + channel) * TILE
 }
 
-pub const fn state_len(tiles: usize, components: usize, channels: usize) -> usize {
-    tiles * components * component_len(channels)
+pub const fn state_len(tiles: usize, channels: usize) -> usize {
+    tiles * COMPONENTS * component_len(channels)
 }
 
 pub struct Update<'a, const CHANNELS: usize> {
@@ -121,7 +136,6 @@ fn any<S: Simd>(simd: S, mask: S::m32s) -> bool {
 }
 
 struct Constants<S: Simd> {
-    components: usize,
     rate: S::f32s,
     keep: S::f32s,
     prior: S::f32s,
@@ -141,17 +155,16 @@ impl<S: Simd> Constants<S> {
     fn new(simd: S, settings: &Settings, rate: f32) -> Self {
         let splat = |value| simd.splat_f32s(value);
         Self {
-            components: settings.max_components,
             rate: splat(rate),
             keep: splat(1.0 - rate),
-            prior: splat(rate * settings.complexity_prior),
-            background_threshold: splat(settings.background_threshold),
-            component_threshold: splat(settings.component_threshold),
-            background_share: splat(settings.background_share),
-            initial_variance: splat(settings.initial_variance),
-            min_variance: splat(settings.min_variance),
-            max_variance: splat(settings.max_variance),
-            darkest: settings.shadow.map(|shadow| splat(shadow.darkest)),
+            prior: splat(rate * COMPLEXITY_PRIOR),
+            background_threshold: splat(BACKGROUND_THRESHOLD),
+            component_threshold: splat(COMPONENT_THRESHOLD),
+            background_share: splat(BACKGROUND_SHARE),
+            initial_variance: splat(INITIAL_VARIANCE),
+            min_variance: splat(MIN_VARIANCE),
+            max_variance: splat(MAX_VARIANCE),
+            darkest: settings.shadow.map(splat),
             zero: splat(0.0),
             one: splat(1.0),
         }
@@ -251,13 +264,13 @@ impl<S: Simd, const CHANNELS: usize> Mixture<'_, S, CHANNELS> {
         x: [S::f32s; CHANNELS],
     ) -> (usize, S::f32s) {
         let simd = self.simd;
-        let places = (used + 1).min(c.components);
+        let places = (used + 1).min(COMPONENTS);
         let mut homeless = orphan;
         let mut total = total;
         for component in 0..places {
             let weight = self.get(component, WEIGHT);
             let empty = simd.less_than_or_equal_f32s(weight, c.zero);
-            let here = if component + 1 == c.components { homeless } else { simd.and_m32s(homeless, empty) };
+            let here = if component + 1 == COMPONENTS { homeless } else { simd.and_m32s(homeless, empty) };
             if !any(simd, here) {
                 continue;
             }
@@ -300,7 +313,7 @@ impl<S: Simd, const CHANNELS: usize> Mixture<'_, S, CHANNELS> {
     }
 
     /// Darker copies of a background component: projection a on the mean's line within darkest <= a <= 1, rest
-    /// `|a mean - x|^2` within background_threshold a^2 variance ("statistical non-parametric": Prati, PAMI 25, 2003).
+    /// `|a mean - x|^2` within BACKGROUND_THRESHOLD a^2 variance ("statistical non-parametric": Prati, PAMI 25, 2003).
     #[inline(always)]
     fn shadow(&self, c: &Constants<S>, darkest: S::f32s, used: usize, x: [S::f32s; CHANNELS]) -> S::m32s {
         let simd = self.simd;

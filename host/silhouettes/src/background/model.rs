@@ -5,7 +5,6 @@ use pulp::Arch;
 
 use super::{
     kernel::{self, TILE, Update},
-    settings::{Settings, SettingsError},
     shake::{self, Shift},
 };
 
@@ -58,6 +57,20 @@ impl Frame<'_> {
     }
 }
 
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// History T; the learning rate is 1 / T after T frames.
+    pub history_frames: u32,
+    /// Darkest shadow relative to the lit background, 0 to 1; `None` labels shadow as foreground.
+    pub shadow: Option<f32>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { history_frames: 500, shadow: Some(0.5) }
+    }
+}
+
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Label {
     #[default]
@@ -70,8 +83,8 @@ pub enum Label {
 /// Errors leave the model unchanged.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BackgroundError {
-    #[error(transparent)]
-    Settings(#[from] SettingsError),
+    #[error("background model: history_frames is 0, but must be at least 1")]
+    History,
     #[error("background model: a frame of {width}x{height} pixels is empty")]
     Empty { height: usize, width: usize },
     #[error("background model: {channels} channels per pixel; give 1 (grey) or 3 (red, green, blue)")]
@@ -119,7 +132,9 @@ pub struct BackgroundModel {
 impl BackgroundModel {
     /// An untrained model for 1 or 3 channels. Memory: 4 (2 + channels) bytes per pixel and component.
     pub fn new(size: (usize, usize), channels: usize, settings: Settings) -> Result<Self, BackgroundError> {
-        settings.check()?;
+        if settings.history_frames == 0 {
+            return Err(BackgroundError::History);
+        }
         let (height, width) = size;
         let pixels = height * width;
         if pixels == 0 {
@@ -130,7 +145,7 @@ impl BackgroundModel {
         }
         let tiles = pixels.div_ceil(TILE);
         Ok(Self {
-            state: vec![0.0; kernel::state_len(tiles, settings.max_components, channels)],
+            state: vec![0.0; kernel::state_len(tiles, channels)],
             used: vec![0; tiles],
             codes: vec![kernel::BACKGROUND; pixels],
             frames_seen: 0,
@@ -220,7 +235,7 @@ impl BackgroundModel {
             for component in 0..usize::from(self.used[tile]) {
                 self.state[first + component * stride] = if component == 0 { 1.0 } else { 0.0 };
             }
-            self.state[first + kernel::VARIANCE_OFFSET] = self.settings.initial_variance;
+            self.state[first + kernel::VARIANCE_OFFSET] = kernel::INITIAL_VARIANCE;
             for channel in 0..self.channels {
                 let level = match frame {
                     Frame::Grey(pixels) => pixels[[row, column]],

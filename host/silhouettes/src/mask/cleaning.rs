@@ -8,43 +8,18 @@ use super::{
     regions::{Connectivity, regions},
 };
 
-/// Radii of squares of side 2 r + 1 pixels; 0 skips a step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Cleaning {
-    pub opening_radius_px: usize,
-    pub closing_radius_px: usize,
-    /// Largest filled hole; larger ones, as between arm and trunk, belong to the shape.
-    pub largest_hole_px: usize,
-}
-
-impl Cleaning {
-    /// For people: opening 1 px, closing height / 120, holes up to 1/3000 of the image.
-    #[must_use]
-    pub fn for_size((height, width): (usize, usize)) -> Self {
-        Self {
-            opening_radius_px: 1,
-            closing_radius_px: (height / 240).max(1),
-            largest_hole_px: height * width / 3000,
-        }
-    }
-
-    #[must_use]
-    pub fn clean(&self, mask: ArrayView2<'_, bool>) -> Mask {
-        let mut clean = if self.opening_radius_px == 0 && self.closing_radius_px == 0 {
-            mask.to_owned()
-        } else {
-            BitMask::pack(mask).opened(self.opening_radius_px).closed(self.closing_radius_px).unpack()
-        };
-        fill_holes(&mut clean, self.largest_hole_px);
-        clean
-    }
+/// For people: opens by 1 px, closes by height / 240, at least 1 px (radii of squares of side 2 r + 1), and fills holes up to
+/// 1/3000 of the image; larger ones, as between arm and trunk, belong to the shape.
+#[must_use]
+pub fn cleaned(mask: ArrayView2<'_, bool>) -> Mask {
+    let (height, width) = mask.dim();
+    let mut clean = BitMask::pack(mask).opened(1).closed((height / 240).max(1)).unpack();
+    fill_holes(&mut clean, height * width / 3000);
+    clean
 }
 
 /// Fills 4-connected unset regions up to `largest_px` that do not touch the image's edge.
-pub fn fill_holes(mask: &mut Mask, largest_px: usize) {
-    if largest_px == 0 {
-        return;
-    }
+fn fill_holes(mask: &mut Mask, largest_px: usize) {
     let size = mask.dim();
     for hole in regions(mask.view(), false, Connectivity::Four) {
         if hole.area <= largest_px && !hole.bounds.touches_edge(size) {
@@ -61,7 +36,7 @@ mod tests {
 
     #[test]
     fn specks_go_cracks_close_and_the_body_keeps_its_outline() {
-        let mut body = Mask::from_elem((60, 60), false);
+        let mut body = Mask::from_elem((250, 250), false);
         body.slice_mut(s![10..50, 20..40]).fill(true);
         let mut dirty = body.clone();
         for (row, column) in [(3, 3), (30, 50), (55, 10), (5, 40)] {
@@ -69,8 +44,7 @@ mod tests {
         }
         dirty.slice_mut(s![28, 20..40]).fill(false);
         dirty.slice_mut(s![40..43, 28..31]).fill(false);
-        let settings = Cleaning { opening_radius_px: 1, closing_radius_px: 1, largest_hole_px: 20 };
-        assert_eq!(settings.clean(dirty.view()), body);
+        assert_eq!(cleaned(dirty.view()), body);
     }
 
     #[test]

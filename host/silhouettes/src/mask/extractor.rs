@@ -5,7 +5,7 @@ use ndarray::Array2;
 
 use super::{
     BoundingBox, Mask,
-    cleaning::Cleaning,
+    cleaning::cleaned,
     feedback::Feedback,
     people::{Person, people},
     subject::{Flag, Subject, SubjectChooser, SubjectSettings},
@@ -64,7 +64,6 @@ impl std::str::FromStr for Learning {
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExtractorSettings {
     pub background: Settings,
-    pub cleaning: Cleaning,
     pub subject: SubjectSettings,
     /// Initial frames that are only learned, and flagged.
     pub learning_frames: u32,
@@ -82,7 +81,6 @@ impl ExtractorSettings {
         let background = Settings { shadow: usual.shadow.filter(|_| frame.has_colour()), ..usual };
         Self {
             background,
-            cleaning: Cleaning::for_size(size),
             subject: SubjectSettings { usual_share: 0.1, ..SubjectSettings::for_size(size) },
             learning_frames: 10,
             scene_change_share: 0.6,
@@ -285,7 +283,7 @@ impl Extractor {
             let flag = Flag::SceneChanged { moving_percent: (100.0 * share) as u8 };
             return Ok(of(Err(flag), labels));
         }
-        let mask = self.settings.cleaning.clean(moving.view());
+        let mask = cleaned(moving.view());
         let people = people(mask.view(), &self.settings.subject);
         if alone {
             let holes = self.feedback.follow(&people, frame, || self.model.background());

@@ -62,15 +62,9 @@ pub struct SubjectSettings {
     pub smallest_fragment_px: usize,
     /// Largest gap between stacked fragments of one person, pixels.
     pub widest_break_px: usize,
-    /// A second person counts from this share of the largest's area.
-    pub rival_share: f64,
     /// A person counts from this share of the usual area of earlier ones; less is noise of a background model, or a rest of a
     /// person. 0 for masks that are given.
     pub usual_share: f64,
-    /// Frames without a person after which the last place is forgotten.
-    pub forget_after_frames: u32,
-    /// Frames with only smaller regions after which the usual area is forgotten: they may be people far away.
-    pub forget_area_after_frames: u32,
 }
 
 impl SubjectSettings {
@@ -81,10 +75,7 @@ impl SubjectSettings {
             smallest_person_px: (pixels / 1000).max(1),
             smallest_fragment_px: (pixels / 10_000).max(1),
             widest_break_px: height / 40,
-            rival_share: 0.3,
             usual_share: 0.0,
-            forget_after_frames: 10,
-            forget_area_after_frames: 500,
         }
     }
 }
@@ -99,6 +90,12 @@ pub struct Subject {
     pub flags: Vec<Flag>,
 }
 
+/// A second person counts from this share of the largest's area.
+const RIVAL_SHARE: f64 = 0.3;
+/// Frames without a person after which the last place is forgotten.
+const FORGET_AFTER_FRAMES: u32 = 10;
+/// Frames with only smaller regions after which the usual area is forgotten: they may be people far away.
+const FORGET_AREA_AFTER_FRAMES: u32 = 500;
 /// Subjects after which their usual area and number of pieces are known.
 const KNOWN_AFTER: usize = 10;
 /// Subjects whose usual area is remembered: few, for people who walk away.
@@ -190,8 +187,7 @@ impl SubjectChooser {
     pub fn among(&mut self, mut people: Vec<Person>, size: (usize, usize)) -> Subject {
         let largest = people.iter().map(|person| person.area).max().unwrap_or(0);
         let usual = self.usual_area().unwrap_or(0);
-        let least =
-            (self.settings.rival_share * largest as f64).max(self.settings.usual_share * usual as f64);
+        let least = (RIVAL_SHARE * largest as f64).max(self.settings.usual_share * usual as f64);
         people.retain(|person| person.area as f64 >= least);
         let subject = match self.last {
             Some(last) => people.iter().min_by(|a, b| distance(a, last).total_cmp(&distance(b, last))),
@@ -199,12 +195,12 @@ impl SubjectChooser {
         };
         let Some(subject) = subject else {
             self.absent_frames = self.absent_frames.saturating_add(1);
-            if self.absent_frames >= self.settings.forget_after_frames {
+            if self.absent_frames >= FORGET_AFTER_FRAMES {
                 self.last = None;
             }
             self.smaller_frames = self.smaller_frames.saturating_add(u32::from(largest > 0));
             self.left_out += usize::from(largest > 0);
-            if self.smaller_frames >= self.settings.forget_area_after_frames {
+            if self.smaller_frames >= FORGET_AREA_AFTER_FRAMES {
                 self.areas.clear();
             }
             return Subject { mask: Mask::from_elem(size, false), bounds: None, flags: vec![Flag::Empty] };

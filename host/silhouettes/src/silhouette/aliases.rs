@@ -32,13 +32,13 @@ type Matches = Vec<(usize, String)>;
 /// `None` if a template fits as well without aliases, or none knows enough names to tell what they lack. A part of a body has no
 /// remark.
 pub fn find(names: &[String]) -> Option<Aliases> {
-    let templates: Vec<Template> = Template::names().filter_map(|name| Template::named(name).ok()).collect();
+    let templates = Template::built_in();
     let covered =
         templates.iter().map(|template| (template.check(names).is_ok(), template.coverage(names).0));
     let covered: Vec<(bool, usize)> = covered.collect();
     // Whether they fit, and how many names one naming knows.
     let mut all: Vec<(bool, usize, Aliases)> = Vec::new();
-    for template in &templates {
+    for template in templates {
         for Candidate { naming, own, names: found } in candidates(names, template) {
             let Some((place, known)) = found.first() else { continue };
             let about = naming.map_or("other spelling", |naming| naming.about);

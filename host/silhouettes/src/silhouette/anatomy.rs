@@ -25,8 +25,7 @@ impl Anatomy {
             .collect();
         let found = aliases::find(names).unwrap_or_default();
         aliases.extend(found.names);
-        let templates: Vec<Template> =
-            Template::names().filter_map(|name| Template::named(name).ok()).collect();
+        let templates = Template::built_in();
         let places = |wanted: &dyn Fn(&str) -> bool| {
             let parts = templates.iter().flat_map(|template| &template.parts);
             let markers: HashSet<&str> = parts

@@ -9,7 +9,7 @@ use super::view::{Canvas, View};
 use crate::mask::{Mask, bits::BitMask};
 use ndarray::s;
 use serde::{Deserialize, Serialize};
-use std::{collections::HashMap, fmt, str::FromStr};
+use std::collections::HashMap;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -20,26 +20,7 @@ pub enum Fill {
     Triplets,
 }
 
-impl fmt::Display for Fill {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Hull => "hull",
-            Self::Triplets => "triplets",
-        })
-    }
-}
-
-impl FromStr for Fill {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "hull" => Ok(Self::Hull),
-            "triplets" => Ok(Self::Triplets),
-            other => Err(format!("unknown fill `{other}`: expected hull or triplets")),
-        }
-    }
-}
+crate::named!(Fill, "fill", "hull" => Hull, "triplets" => Triplets);
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct PartsSilhouette {

@@ -10,6 +10,7 @@
 
 use super::anatomy::without_prefix;
 use serde::{Deserialize, Serialize};
+use std::sync::LazyLock;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -138,10 +139,16 @@ impl Template {
 
     /// One of [`Template::BUILT_IN`].
     pub fn named(name: &str) -> Result<Self, TemplateError> {
-        match Self::BUILT_IN.iter().find(|(known, _)| *known == name) {
-            Some((_, text)) => Self::parse(text),
-            None => Err(TemplateError::Name(name.to_owned())),
-        }
+        let found = Self::built_in().iter().find(|template| template.name == name);
+        found.cloned().ok_or_else(|| TemplateError::Name(name.to_owned()))
+    }
+
+    /// Parsed once, because every recording is compared with all of them.
+    pub(super) fn built_in() -> &'static [Self] {
+        static PARSED: LazyLock<Vec<Template>> = LazyLock::new(|| {
+            Template::BUILT_IN.iter().filter_map(|(_, text)| Template::parse(text).ok()).collect()
+        });
+        &PARSED
     }
 
     /// Built-in templates by name, as TOML: Plug-in Gait (and CMU 41), Vicon's 53 markers, OpenCap, Li 2014,

@@ -189,7 +189,7 @@ fn odd_frames_are_refused_by_name() {
     let two = BackgroundModel::new((4, 5), 2, Settings::default());
     assert!(matches!(two, Err(BackgroundError::Channels { channels: 2 })));
     let bad = BackgroundModel::new((4, 5), 1, Settings { history_frames: 0, ..Settings::default() });
-    assert!(matches!(bad, Err(BackgroundError::Settings(_))));
+    assert!(matches!(bad, Err(BackgroundError::History)));
 
     let mut model = BackgroundModel::new((4, 5), 1, Settings::default()).unwrap();
     let error = model.apply(Frame::Grey(Array2::zeros((5, 4)).view())).unwrap_err();
@@ -203,34 +203,30 @@ fn odd_frames_are_refused_by_name() {
 struct Plain(Vec<(f64, f64, f64)>);
 
 impl Plain {
-    fn observe(&mut self, x: f64, rate: f64, s: &Settings) -> bool {
+    fn observe(&mut self, x: f64, rate: f64) -> bool {
         self.0.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let near = |threshold: f32, (_, mean, variance): (f64, f64, f64)| {
-            (x - mean).powi(2) < f64::from(threshold) * variance
-        };
-        let owner = self.0.iter().position(|&component| near(s.component_threshold, component));
+        let near =
+            |threshold: f64, (_, mean, variance): (f64, f64, f64)| (x - mean).powi(2) < threshold * variance;
+        let owner = self.0.iter().position(|&component| near(9.0, component));
         let (mut background, mut heavier) = (false, 0.0);
         for (index, component) in self.0.iter_mut().enumerate() {
             let considered = owner.is_none_or(|owner| index <= owner);
-            background |= considered
-                && heavier < f64::from(s.background_share)
-                && near(s.background_threshold, *component);
+            background |= considered && heavier < f64::from(0.9_f32) && near(16.0, *component);
             let o = f64::from(u8::from(owner == Some(index)));
-            component.0 += rate * (o - component.0) - rate * f64::from(s.complexity_prior);
+            component.0 += rate * (o - component.0) - rate * f64::from(0.05_f32);
             let step = (rate / component.0).min(1.0);
             if owner == Some(index) {
                 let offset = x - component.1;
                 component.1 += step * offset;
-                component.2 = (component.2 + step * (offset * offset - component.2))
-                    .clamp(f64::from(s.min_variance), f64::from(s.max_variance));
+                component.2 = (component.2 + step * (offset * offset - component.2)).clamp(4.0, 75.0);
             }
             heavier += component.0.max(0.0);
         }
         self.0.retain(|component| component.0 > 0.0);
         if owner.is_none() {
             self.0.sort_by(|a, b| b.0.total_cmp(&a.0));
-            self.0.truncate(s.max_components - 1);
-            self.0.push((rate, x, f64::from(s.initial_variance)));
+            self.0.truncate(4);
+            self.0.push((rate, x, 15.0));
         }
         let total: f64 = self.0.iter().map(|component| component.0).sum();
         self.0.iter_mut().for_each(|component| component.0 /= total);
@@ -240,8 +236,8 @@ impl Plain {
 
 #[test]
 fn the_kernel_agrees_with_the_equations_written_plainly() {
-    let settings = Settings { shadow: None, history_frames: 50, ..Settings::default() };
-    let mut model = BackgroundModel::new(SIZE, 1, settings.clone()).unwrap();
+    let settings = Settings { shadow: None, history_frames: 50 };
+    let mut model = BackgroundModel::new(SIZE, 1, settings).unwrap();
     let mut plain: Vec<Plain> = (0..SIZE.0 * SIZE.1).map(|_| Plain::default()).collect();
     let mut noise = Noise(7);
     let (mut differ, mut all) = (0_usize, 0_usize);
@@ -254,7 +250,7 @@ fn the_kernel_agrees_with_the_equations_written_plainly() {
         let labels = model.apply(Frame::Grey(picture.view())).unwrap();
         let rate = if frame == 1 { 1.0 } else { 1.0 / f64::from((2 * frame).min(50)) };
         for ((mixture, &level), label) in plain.iter_mut().zip(&picture).zip(&labels) {
-            let background = mixture.observe(f64::from(level), rate, &settings);
+            let background = mixture.observe(f64::from(level), rate);
             differ += usize::from(background != (*label == Label::Background));
             all += 1;
         }

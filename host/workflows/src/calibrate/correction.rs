@@ -177,7 +177,7 @@ pub fn list(list: &Path) -> Result<Vec<(PathBuf, f64)>> {
 }
 
 /// Refuses a distance in another unit.
-fn check_distance(index: usize, pattern: &Pattern<'_>) -> Result<()> {
+pub fn check_distance(index: usize, pattern: &Pattern<'_>) -> Result<()> {
     let Some(median) = quantile::of_values(depths(pattern.depth_mm).map(f64::from), 0.5) else {
         return Ok(());
     };

@@ -202,7 +202,8 @@ pub fn fit(settings: &CalibratePsfRequest, context: &Context<'_>) -> Result<PsfF
     })
 }
 
-fn doubt(found: &PsfFit, model: Model) -> Option<String> {
+/// Doubt about a fit.
+pub fn doubt(found: &PsfFit, model: Model) -> Option<String> {
     let width = found.width();
     match found.verdict() {
         Verdict::Good => None,
@@ -221,7 +222,7 @@ fn doubt(found: &PsfFit, model: Model) -> Option<String> {
              Depth measured with it is biased",
             100.0 * found.residual,
             100.0 * found.noise,
-            if model == Model::Free { "" } else { "try --model free; else: " }
+            if model == Model::Free { "" } else { "try the model free; else: " }
         )),
     }
 }

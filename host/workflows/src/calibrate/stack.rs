@@ -1,5 +1,6 @@
 //! Calibrates a lens file from one z-stack of a flat, textured target.
 
+mod pair;
 mod plot;
 mod verdict;
 
@@ -11,7 +12,6 @@ use std::{
 use farnear_capture::record::read_record;
 use farnear_depth::{
     calibrate::stack::{AtDepth, LENSES, Moved, StackError, StackLens, StackSettings, calibrate_stack},
-    mosaic::{self, is_mosaic},
     optics::{Optics, Stage},
 };
 use farnear_files::{
@@ -25,7 +25,6 @@ use serde_with::{DisplayFromStr, serde_as};
 
 use crate::{
     context::Context,
-    depth::tone,
     error::{Result, WorkflowError},
     figures::{rounded, rounded_for},
     focus_stack::fill_specks,
@@ -33,6 +32,8 @@ use crate::{
     plot::Format,
     request::{PathKind, Request},
 };
+use pair::pair_to_try;
+pub use pair::{curved_light, filled_pixels, raw_mosaic};
 pub use verdict::verdict;
 
 /// Largest difference of a step from the usual one, relative to it.
@@ -225,8 +226,7 @@ pub fn calibrate(request: &CalibrateStackRequest, context: &Context<'_>) -> Resu
         error => WorkflowError::parameter("stack", request.stack.display(), error.to_string()),
     })?;
     let figures = figures(&found, &listed, slices[0].dim(), request);
-    let [far, near] = pair_to_try(&found, slices[0].dim(), slices.len());
-    if let Some(doubt) = tone::doubt_of_slices(&slices[far], &slices[near], &found.optics) {
+    if let Some(doubt) = curved_light(&found, &slices) {
         context.progress.warn(&doubt);
     }
     let drawn = match plot {
@@ -369,11 +369,16 @@ fn read(
     let frames = request.camera_frames.as_deref().map(|folder| context.cache.camera(folder)).transpose()?;
     let mut slices = Vec::with_capacity(images.len());
     let mut white = SharedWhiteLevel::default();
-    let (mut coding, mut filled) = (0.0, 0);
+    let (mut coding, mut filled, mut are_floats) = (0.0, 0, None);
     stack::read(images, &settings, |index, mut image| -> Result<()> {
         context.cancel.check("reading the slices")?;
         context.progress.advance("slices", index + 1, Some(images.len()));
         white.add(&image);
+        let is_float = image.samples == Samples::Float;
+        if *are_floats.get_or_insert(is_float) != is_float {
+            let expected = "expected pixels of one kind in all slices, integers or floats: scales differ";
+            return Err(WorkflowError::parameter("stack", images[index].display(), expected));
+        }
         if let Some(frames) = &frames {
             let clipped = match image.samples {
                 Samples::Integer(_) => image.white_level.unwrap_or(1.0),
@@ -390,38 +395,22 @@ fn read(
             return Err(WorkflowError::parameter("stack", images[index].display(), expected));
         }
         coding += image.coding_variance / images.len() as f64;
-        if index == 0 && is_mosaic(image.pixels.view()) {
-            context.progress.warn(mosaic::WORDS);
+        if index == 0
+            && let Some(remark) = raw_mosaic(&image.pixels)
+        {
+            context.progress.warn(&remark);
         }
         slices.push(image.pixels);
         Ok(())
     })?;
-    if filled > 0 {
-        context.progress.warn(&format!(
-            "{filled} single pixels of the slices have no value (NaN, transparent, or 1000 times the usual one): the mean of their neighbours replaces each"
-        ));
+    if let Some(remark) = filled_pixels(filled) {
+        context.progress.warn(&remark);
     }
     if let Some(white) = white.get(request.white_level.is_some()) {
         slices.iter_mut().for_each(|slice| slice.mapv_inplace(|value| relative(value, white)));
         coding /= f64::from(white).powi(2);
     }
     Ok((slices, coding))
-}
-
-/// The far image of the pair whose range has the focus between its middle, where both images look the same, and an end.
-fn telling_pair(focus: f64, pair_step: usize, slices: usize) -> usize {
-    let off = |far: &usize| {
-        let alpha = 2.0 * (focus - *far as f64) / pair_step as f64 - 1.0;
-        (alpha.abs() - 0.6).abs()
-    };
-    (0..slices.saturating_sub(pair_step)).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0)
-}
-
-/// The far and the near slice of the pair to try first.
-fn pair_to_try(found: &StackLens, (height, width): (usize, usize), slices: usize) -> [usize; 2] {
-    let pair_step = found.optics.stage().map_or(1, |stage| stage.pair_step);
-    let far = telling_pair(found.plane.at(0.5 * height as f64, 0.5 * width as f64), pair_step, slices);
-    [far, far + pair_step]
 }
 
 /// A path as a word of a shell's command.

@@ -36,14 +36,17 @@ fn is_one(bin: &usize) -> bool {
 
 impl Part {
     /// Images of (height, width) of which averaging leaves out columns or rows at the end.
-    pub(super) fn of_bins((height, width): (usize, usize), bin: usize) -> Option<Self> {
+    pub fn of_bins((height, width): (usize, usize), bin: usize) -> Option<Self> {
         let is_less = !width.is_multiple_of(bin) || !height.is_multiple_of(bin);
         is_less.then_some(Self { x: 0, y: 0, image_width: width, image_height: height, bin })
     }
 
     /// Whether a map of (height, width) can be this part.
     pub fn fits(&self, (height, width): (usize, usize)) -> bool {
-        self.x + width * self.bin <= self.image_width && self.y + height * self.bin <= self.image_height
+        let lies_within = |begin: usize, size: usize, all: usize| {
+            size.checked_mul(self.bin).and_then(|size| begin.checked_add(size)).is_some_and(|end| end <= all)
+        };
+        lies_within(self.x, width, self.image_width) && lies_within(self.y, height, self.image_height)
     }
 
     /// Optical axis (centre of the images) in the map: column and row.
@@ -125,6 +128,7 @@ mod tests {
         let part = Part::of_bins((480, 643), 4).unwrap();
         assert_eq!(part.axis_px(), [79.875, 59.5]);
         assert!(part.fits((120, 160)) && !part.fits((120, 161)));
+        assert!(!Part { x: usize::MAX, ..part }.fits((120, 160)));
         let kept: Part = toml::from_str(&toml::to_string(&part).unwrap()).unwrap();
         assert_eq!(kept, part);
         let whole: Part = toml::from_str("x = 5\ny = 0\nimage_width = 9\nimage_height = 9\n").unwrap();

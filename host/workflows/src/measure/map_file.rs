@@ -14,7 +14,7 @@ use farnear_files::{
 use ndarray::Array2;
 use serde::Deserialize;
 
-use super::{Measured, Unit, lateral};
+use super::{Measured, Unit, lateral, lateral_of_stack};
 use crate::{
     depth::part::Part,
     error::{Result, WorkflowError},
@@ -131,7 +131,7 @@ pub(super) fn read(path: &Path) -> Result<Measured> {
     let lateral = match &record {
         Some(Record::Depth(record)) => lateral(&record.optics, part),
         Some(Record::Stack(record)) => match (unit, &record.optics, record.object_pixel_um) {
-            (Unit::Mm, Some(optics), _) => lateral(optics, None),
+            (Unit::Mm, Some(optics), _) => lateral_of_stack(optics),
             (Unit::Um, _, Some(side)) => Lateral::Pixel(side),
             _ => Lateral::Unknown,
         },

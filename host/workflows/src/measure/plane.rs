@@ -100,10 +100,9 @@ fn slopes(pixels: &[(usize, usize, f64)], dim: (usize, usize), lateral: Lateral)
     };
     let slopes = match lateral {
         Lateral::Lens(lens) => {
-            let Projection { focal_length_mm, pixel_um, .. } = lens;
-            let found =
-                Linear::of(pixels.iter().map(|&pixel| at((pixel.2 - focal_length_mm).recip(), pixel)))?;
-            let unit = found.at(lens.axis_in(dim)) * pixel_um * 1e-3 / focal_length_mm;
+            let Projection { centre_mm, distance_mm, pixel_um, .. } = lens;
+            let found = Linear::of(pixels.iter().map(|&pixel| at((pixel.2 - centre_mm).recip(), pixel)))?;
+            let unit = found.at(lens.axis_in(dim)) * pixel_um * 1e-3 / distance_mm;
             [-found.per_column / unit, found.per_row / unit]
         }
         Lateral::Pixel(side) => even(side)?,
@@ -163,7 +162,7 @@ mod tests {
 
     use super::*;
 
-    const LENS: Projection = Projection { focal_length_mm: 50.0, pixel_um: 7.4, axis_px: None };
+    const LENS: Projection = Projection { centre_mm: 50.0, distance_mm: 50.0, pixel_um: 7.4, axis_px: None };
 
     fn whole(depth: &Array2<f32>, lateral: Lateral) -> Option<Plane> {
         let (height, width) = depth.dim();

@@ -73,7 +73,7 @@ mod tests {
     fn the_line_is_followed() {
         let mut depth_mm = Array2::from_shape_fn((10, 20), |(y, x)| (100 * y + x) as f32);
         depth_mm[[2, 4]] = f32::NAN;
-        let projection = Projection { focal_length_mm: 50.0, pixel_um: 7.4, axis_px: None };
+        let projection = Projection { centre_mm: 50.0, distance_mm: 50.0, pixel_um: 7.4, axis_px: None };
         let lateral = Lateral::Lens(projection);
         let map = Measured { depth: depth_mm, deviation: None, unit: Unit::Mm, lateral, remarks: vec![] };
         let found = profile(&map, [0, 0], [8, 4]).unwrap().points;

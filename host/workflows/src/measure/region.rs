@@ -100,7 +100,7 @@ mod tests {
     fn slanted() -> Measured {
         let mut depth_mm = Array2::from_shape_fn((40, 60), |(y, x)| 900.0 + 0.05 * x as f32 + 0.0 * y as f32);
         depth_mm[[0, 0]] = f32::NAN;
-        let projection = Projection { focal_length_mm: 50.0, pixel_um: 7.4, axis_px: None };
+        let projection = Projection { centre_mm: 50.0, distance_mm: 50.0, pixel_um: 7.4, axis_px: None };
         Measured {
             deviation: Some(Array2::from_elem((40, 60), 0.5)),
             depth: depth_mm,

@@ -212,7 +212,7 @@ fn figures(optics: &Optics, binning: usize, contrast: f64, accepted_mm: Option<f
     let span_mm = range.far_mm - range.near_mm;
     let estimate = |mm: f64| Some(rounded_for(mm, mm, 4)).filter(|mm| *mm < span_mm);
     let [farthest_mm, nearest_mm] = optics.range_mm(LARGEST_ALPHA).map(|mm| rounded_for(span_mm, mm, 3));
-    let pixel_mm = optics.pixel_um() * 1e-3 * (range.alpha0_mm / optics.focal_length_mm() - 1.0);
+    let pixel_mm = optics.pixel_at_object_mm(range.alpha0_mm);
     let mut advice = advice(optics);
     let averaged = accepted_mm.map(|accepted| (error.whitened_mm / accepted).powi(2).ceil().max(1.0));
     if let Some(needed) = averaged.filter(|needed| *needed > 1.0) {

@@ -20,7 +20,7 @@ use crate::{
     context::Context,
     error::{Result, WorkflowError},
     figures::{rounded, rounded_for},
-    measure::{Rectangle, fit},
+    measure::{Rectangle, assumed_projection, fit},
     optics::GivenOptics,
     quantile,
     request::{PathKind, Request},
@@ -172,11 +172,7 @@ pub fn measure(request: &QualityRequest, context: &Context<'_>) -> Result<Qualit
         maps.push(found.map.depth_mm);
         context.progress.advance("pairs", index + 1, Some(request.pairs));
     }
-    let projection = Projection {
-        focal_length_mm: optics.optics.focal_length_mm(),
-        pixel_um: optics.optics.pixel_um(),
-        axis_px: None,
-    };
+    let projection = assumed_projection(&optics.optics, None);
     let found = figures(&maps, predicted.as_ref(), projection, request.true_mm)?;
     let found = QualityFigures { time: (!emulated).then(clock::now_rfc3339).flatten(), ..found };
     if let Some(warning) = found.warning() {
@@ -256,7 +252,8 @@ fn spread(values: &[f64]) -> (f64, f64) {
 mod tests {
     use super::*;
 
-    const PROJECTION: Projection = Projection { focal_length_mm: 50.0, pixel_um: 7.4, axis_px: None };
+    const PROJECTION: Projection =
+        Projection { centre_mm: 50.0, distance_mm: 50.0, pixel_um: 7.4, axis_px: None };
 
     /// Maps of a plane at 900 mm that differ by `noise` from pair to pair.
     fn maps(noise: f32) -> Vec<Array2<f32>> {

@@ -37,8 +37,10 @@ const EXPECTED: &str = "recorded pairs";
 pub const PAIRS_MAX: usize = 2000;
 const OPTICS_MAX: u32 = 1 << 20;
 const PIXELS_MAX: usize = 1 << 26;
-/// Pairs read before they are due.
+/// Pairs of each lane that are read before they are due.
 const AHEAD: usize = 2;
+/// Pairs that are computed at once in fast play. Two pairs on one thread each end sooner than one after the other on two.
+const LANES: usize = 2;
 const LOOK: Duration = Duration::from_millis(20);
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -225,9 +227,9 @@ struct Ready {
     grey: [Array2<f32>; 2],
 }
 
-/// Reads up to [`AHEAD`] pairs in advance until the end, an error, or a closed receiver.
-fn read_ahead(mut recording: Recording, to: &SyncSender<Result<Ready>>) {
-    loop {
+/// Reads up to [`AHEAD`] pairs in advance until the end, an error, or a closed receiver. The lanes get pairs in turn.
+fn read_ahead(mut recording: Recording, lanes: &[SyncSender<Result<Ready>>]) {
+    for to in lanes.iter().cycle() {
         let ready = match recording.next_pair() {
             Ok(Some(pair)) => Ok(Ready { grey: [&pair.far, &pair.near].map(Image::grey), pair }),
             Ok(None) => return,
@@ -278,7 +280,8 @@ fn compute(
     }
 }
 
-/// Plays a recording and passes each pair with its depth to `on_depth`, while other threads read and compute the next.
+/// Plays a recording and passes each pair with its depth to `on_depth`, while other threads read and compute the next. In fast
+/// play each lane has its own noise and registration, from the pairs that it computes.
 pub fn play(
     path: &Path,
     fast: bool,
@@ -287,16 +290,27 @@ pub fn play(
 ) -> Result<PlayFigures> {
     let recording = Recording::open(path)?;
     let optics = recording.optics;
-    let mut depths = stream(&optics)?;
+    let lanes = if fast { LANES } else { 1 };
+    let threads = rayon::current_num_threads().div_ceil(lanes);
     let (begin, mut latencies_ms, mut seconds) = (Instant::now(), Vec::new(), 0.0);
     let mut unrelated_pairs = 0;
     thread::scope(|scope| {
         // Each thread ends when its receiver is dropped, the last of them at the end of this closure.
-        let (to, pairs) = mpsc::sync_channel(AHEAD);
-        let (computed, maps) = mpsc::sync_channel(0);
-        scope.spawn(move || read_ahead(recording, &to));
-        scope.spawn(move || compute(&mut depths, pairs, (!fast).then_some(begin), context, &computed));
-        for map in maps {
+        let (mut to_lanes, mut maps) = (Vec::new(), Vec::new());
+        for _ in 0..lanes {
+            let mut depths = stream(&optics)?;
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            let pool = pool.map_err(|error| WorkflowError::Thread { reason: error.to_string() })?;
+            let (to, pairs) = mpsc::sync_channel(AHEAD);
+            let (computed, map) = mpsc::sync_channel(0);
+            to_lanes.push(to);
+            maps.push(map);
+            let due = (!fast).then_some(begin);
+            scope.spawn(move || pool.install(|| compute(&mut depths, pairs, due, context, &computed)));
+        }
+        scope.spawn(move || read_ahead(recording, &to_lanes));
+        // After the last pair the next lane in turn is closed.
+        for map in maps.iter().cycle().map_while(|lane| lane.recv().ok()) {
             let Computed { pair: RecordedPair { at, far, near }, found, arrived, latency_ms } = map?;
             if latencies_ms.is_empty()
                 && unrelated_pairs == 0
@@ -311,7 +325,8 @@ pub fn play(
             latencies_ms.push(latency_ms);
             seconds = at.as_secs_f64();
             context.progress.advance("pairs", latencies_ms.len(), None);
-            let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
+            // In fast play a map waits for its turn.
+            let latency_ms = if fast { latency_ms } else { arrived.elapsed().as_secs_f64() * 1e3 };
             on_depth(LiveDepth { far: &far, near: &near, found: &found, pair_ms: 0.0, latency_ms }, &optics)?;
         }
         Ok::<_, WorkflowError>(())

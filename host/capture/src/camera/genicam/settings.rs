@@ -1,10 +1,18 @@
-use aravis::{Auto, prelude::*};
+use aravis::{
+    Auto,
+    glib::{Error, GString},
+    prelude::*,
+};
 
-use super::GenicamCamera;
+use super::{GenicamCamera, unusable};
 use crate::camera::{CameraError, Control, Range, Setting};
 
 const AUTOMATICS: [&str; 3] = ["ExposureAuto", "GainAuto", "BlackLevelAuto"];
+const ACTIVATION: &str = "TriggerActivation";
+const RISING: &str = "RisingEdge";
 const FALLING: &str = "FallingEdge";
+/// Triggers of a frame, the best one first.
+const STARTS: [&str; 3] = ["FrameStart", "FrameBurstStart", "AcquisitionStart"];
 /// Steps of the camera's exposure: some lines, and a part of the exposure. The board's tolerance of the strobe is narrower.
 const EXPOSURE_OFF_US: f64 = 100.0;
 const EXPOSURE_OFF: f64 = 0.01;
@@ -45,15 +53,76 @@ impl GenicamCamera {
         self.camera.float("Gamma").ok()
     }
 
-    /// Aravis sets the rising edge. An opto-coupler with an open collector inverts the pulse and needs the falling one.
+    /// Turns off all triggers and returns them. A camera may refuse one while another is on, so the refused ones are tried
+    /// again. A refusal counts where the trigger is on.
+    pub(super) fn triggers_off(&self) -> Result<Vec<GString>, CameraError> {
+        let camera = &self.camera;
+        if !camera.is_feature_available("TriggerSelector").map_err(self.failed())? {
+            camera.set_string("TriggerMode", "Off").map_err(self.failed())?;
+            return Ok(Vec::new());
+        }
+        let triggers = camera.dup_available_triggers().map_err(self.failed())?;
+        let mut refused = None;
+        for _ in 0..2 {
+            refused = None;
+            for trigger in &triggers {
+                camera.set_string("TriggerSelector", trigger).map_err(self.failed())?;
+                let Err(error) = camera.set_string("TriggerMode", "Off") else { continue };
+                if !self.answers() {
+                    return Err(self.gone());
+                }
+                if self.entry("TriggerMode").is_some_and(|mode| mode != "Off") {
+                    refused = Some(error);
+                }
+            }
+            if refused.is_none() {
+                break;
+            }
+        }
+        refused.map_or(Ok(triggers), |error| Err(self.failed()(error)))
+    }
+
+    /// Does the same as Aravis' function, which however stops at the first refusal and always sets the rising edge. An
+    /// opto-coupler with an open collector inverts the pulse and needs the falling one.
     pub(super) fn set_trigger(&self, source: &str) -> Result<(), CameraError> {
         let camera = &self.camera;
-        let _ = camera.set_string("TriggerSelector", "FrameStart"); // some have no selector
-        let falls = self.entry("TriggerActivation").is_some_and(|edge| edge == FALLING);
-        camera.set_trigger(source).map_err(self.failed())?;
-        match falls {
-            true => camera.set_string("TriggerActivation", FALLING).map_err(self.failed()),
-            false => Ok(()),
+        let set = |name: &str, entry: &str| camera.set_string(name, entry).map_err(self.failed());
+        const LIMIT: &str = "AcquisitionFrameRateEnable";
+        if camera.is_feature_available(LIMIT).map_err(self.failed())? {
+            camera.set_boolean(LIMIT, false).map_err(self.failed())?;
+        }
+        let triggers = self.triggers_off()?;
+        if !triggers.is_empty() {
+            let has = |name: &&str| triggers.iter().any(|trigger| trigger == *name);
+            let start = STARTS.into_iter().find(has);
+            let none = || unusable(&self.id, format!("it has none of the triggers {}", STARTS.join(", ")));
+            set("TriggerSelector", start.ok_or_else(none)?)?;
+        }
+        set("TriggerMode", "On")?;
+        let edges = camera.dup_available_enumerations_as_strings(ACTIVATION).unwrap_or_default();
+        let falls = self.entry(ACTIVATION).is_some_and(|edge| edge == FALLING);
+        if !falls && edges.iter().any(|edge| edge == RISING) {
+            set(ACTIVATION, RISING)?;
+        }
+        set("TriggerSource", source)
+    }
+
+    /// Name and bounds of a setting that is a whole number under its standard name, where Aravis expects fractions.
+    fn whole(&self, setting: &Setting) -> Option<(&'static str, i64, i64)> {
+        let name = match setting {
+            Setting::ExposureUs(_) => "ExposureTime",
+            Setting::Gain(_) => "Gain",
+            _ => "BlackLevel",
+        };
+        self.camera.integer_bounds(name).ok().map(|(min, max)| (name, min, max))
+    }
+
+    fn number(&self, setting: &Setting) -> Result<f64, Error> {
+        match (self.whole(setting), setting) {
+            (Some((name, ..)), _) => self.camera.integer(name).map(|value| value as f64),
+            (None, Setting::ExposureUs(_)) => self.camera.exposure_time(),
+            (None, Setting::Gain(_)) => self.camera.gain(),
+            (None, _) => self.camera.black_level(),
         }
     }
 
@@ -63,19 +132,12 @@ impl GenicamCamera {
         let mut controls = Vec::new();
         let mut add =
             |name: &str, value: String, range| controls.push(Control { name: name.into(), value, range });
-        let numbers = [
-            (Setting::ExposureUs(0.0), camera.exposure_time()),
-            (Setting::Gain(0.0), camera.gain()),
-            (Setting::BlackLevel(0.0), camera.black_level()),
-        ];
-        for (setting, value) in numbers {
-            if let (Some(range), Ok(value)) = (self.range(&setting), value) {
+        for setting in [Setting::ExposureUs(0.0), Setting::Gain(0.0), Setting::BlackLevel(0.0)] {
+            if let (Some(range), Ok(value)) = (self.range(&setting), self.number(&setting)) {
                 add(setting.name(), value.to_string(), range);
             }
         }
-        let names = |names: Vec<aravis::glib::GString>| {
-            Range::Choice(names.iter().map(ToString::to_string).collect())
-        };
+        let names = |names: Vec<GString>| Range::Choice(names.iter().map(ToString::to_string).collect());
         let formats = camera.dup_available_pixel_formats_as_strings().map_err(&failed)?;
         let format = self.entry("PixelFormat").unwrap_or_else(|| "unknown".into());
         add("pixel_format", format, names(formats));
@@ -94,7 +156,7 @@ impl GenicamCamera {
                 add(name, value.to_string(), Range::Fixed);
             }
         }
-        for name in AUTOMATICS.into_iter().chain(["TriggerActivation"]) {
+        for name in AUTOMATICS.into_iter().chain([ACTIVATION]) {
             if let Some(entry) = self.entry(name) {
                 add(name, entry, Range::Fixed);
             }
@@ -127,27 +189,28 @@ impl GenicamCamera {
             return Err(wrong(format!("expected {range}")));
         }
         // Automatic modes are switched off; a camera without them needs nothing.
-        let set = match setting {
-            Setting::ExposureUs(_) => {
-                let _ = self.camera.set_exposure_time_auto(Auto::Off);
-                self.camera.set_exposure_time(value)
+        let _ = match setting {
+            Setting::ExposureUs(_) => self.camera.set_exposure_time_auto(Auto::Off),
+            Setting::Gain(_) => self.camera.set_gain_auto(Auto::Off),
+            _ => Ok(()),
+        };
+        let set = match (self.whole(setting), setting) {
+            (Some(_), Setting::Gain(_) | Setting::BlackLevel(_)) if value.fract() != 0.0 => {
+                return Err(wrong("expected a whole number".into()));
             }
-            Setting::Gain(_) => {
-                let _ = self.camera.set_gain_auto(Auto::Off);
-                match value < 0.0 {
-                    true => self.camera.set_float("Gain", value), // Aravis ignores a negative gain
-                    false => self.camera.set_gain(value),
-                }
-            }
-            _ => self.camera.set_black_level(value),
+            (Some((name, ..)), _) => self.camera.set_integer(name, value.round() as i64),
+            (None, Setting::ExposureUs(_)) => self.camera.set_exposure_time(value),
+            // Aravis ignores a negative gain.
+            (None, Setting::Gain(_)) if value < 0.0 => self.camera.set_float("Gain", value),
+            (None, Setting::Gain(_)) => self.camera.set_gain(value),
+            (None, _) => self.camera.set_black_level(value),
         };
         set.map_err(self.failed())?;
-        let (taken, off) = match setting {
-            Setting::ExposureUs(_) => (self.camera.exposure_time(), EXPOSURE_OFF_US + value * EXPOSURE_OFF),
-            Setting::Gain(_) => (self.camera.gain(), LEVEL_OFF),
-            _ => (self.camera.black_level(), LEVEL_OFF),
+        let off = match setting {
+            Setting::ExposureUs(_) => EXPOSURE_OFF_US + value * EXPOSURE_OFF,
+            _ => LEVEL_OFF,
         };
-        let taken = taken.map_err(self.failed())?;
+        let taken = self.number(setting).map_err(self.failed())?;
         match (taken - value).abs() > off {
             true => Err(wrong(format!("the camera made {taken} of it; expected a value that it can set"))),
             false => Ok(()),
@@ -156,13 +219,14 @@ impl GenicamCamera {
 
     pub(super) fn range(&self, setting: &Setting) -> Option<Range> {
         let camera = &self.camera;
-        let (bounds, unit) = match setting {
-            Setting::ExposureUs(_) => (camera.exposure_time_bounds(), "us"),
-            Setting::Gain(_) if camera.is_gain_available().ok()? => (camera.gain_bounds(), ""),
-            Setting::BlackLevel(_) if self.has_black_level() => (camera.black_level_bounds(), ""),
+        let unit = if matches!(setting, Setting::ExposureUs(_)) { "us" } else { "" };
+        let (min, max) = match (self.whole(setting), setting) {
+            (Some((_, min, max)), _) => (min as f64, max as f64),
+            (None, Setting::ExposureUs(_)) => camera.exposure_time_bounds().ok()?,
+            (None, Setting::Gain(_)) if camera.is_gain_available().ok()? => camera.gain_bounds().ok()?,
+            (None, Setting::BlackLevel(_)) if self.has_black_level() => camera.black_level_bounds().ok()?,
             _ => return None,
         };
-        let (min, max) = bounds.ok()?;
         Some(Range::Number { min, max, unit })
     }
 
@@ -216,7 +280,7 @@ impl GenicamCamera {
         &self,
         setting: &Setting,
         asked: &str,
-        known: &[aravis::glib::GString],
+        known: &[GString],
     ) -> Result<(), CameraError> {
         if known.iter().any(|name| name == asked) {
             return Ok(());

@@ -200,6 +200,9 @@ fn count_and_time_must_agree() {
     assert_eq!(judge(Some(65_535), Some(9_100_000), shot(7, 400_000)).unwrap(), Belongs::Earlier);
     let error = judge(Some(2), Some(9_400_000), shot(7, 400_000)).unwrap_err().to_string();
     assert!(error.contains("exposure 7") && error.contains("200ms") && error.contains("100ms"), "{error}");
+    // A clock of 32 bits has wrapped.
+    let error = judge(Some(2), Some(5_000), shot(7, 400_000)).unwrap_err().to_string();
+    assert!(error.contains("9.195s before that of the picture before it"), "{error}");
 }
 
 #[test]

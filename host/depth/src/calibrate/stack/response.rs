@@ -364,7 +364,7 @@ impl Target<'_> {
             looked_at += 1;
             let Some((map, estimate)) = &found else { continue };
             let measured = optics.alpha(f64::from(map.depth_mm[(y, x)]));
-            let slope = optics.depth_per_alpha_mm(0.0).abs();
+            let slope = optics.depth_per_alpha_mm(measured).abs();
             let noise = f64::from(estimate.deviation_mm[(y, x)]) / slope;
             let usable = pair.prepared.reasons[(y, x)] == 0 && measured.is_finite() && noise < TOO_NOISY;
             if usable {

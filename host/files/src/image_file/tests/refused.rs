@@ -46,6 +46,38 @@ fn rejects_truncated_files_of_every_format() {
 }
 
 #[test]
+fn rejects_a_pam_file_whose_samples_have_no_stated_kind() {
+    let pam = |kind: &str, largest: u32, samples: &[u8]| {
+        let header = format!("P7\nWIDTH 2\nHEIGHT 1\nDEPTH 1\nMAXVAL {largest}\n{kind}ENDHDR\n");
+        [header.as_bytes(), samples].concat()
+    };
+    let wide = [0x0f, 0xff, 0x08, 0x00];
+    assert!(refusal(&pam("", 4095, &wide)).contains("TUPLTYPE"));
+    let pixels = |bytes: &[u8]| decode_grey(bytes).unwrap().pixels;
+    assert_eq!(pixels(&pam("TUPLTYPE GRAYSCALE\n", 4095, &wide))[[0, 0]], 1.0);
+    assert_eq!(pixels(&pam("", 255, &[255, 0]))[[0, 0]], 1.0);
+}
+
+#[test]
+fn rejects_a_pgm_file_whose_pixels_do_not_begin_behind_its_header() {
+    let pgm = |between: &str, padding: &[u8]| {
+        [format!("P5\n2 1\n65535{between}").as_bytes(), &[0x80, 0x01, 0xff, 0xff], padding].concat()
+    };
+    for between in ["\r\n", "\n# a comment\n"] {
+        let mut file = pgm(between, b"");
+        assert!(refusal(&file).contains("data follow its pixels"), "{between:?}");
+        // As padding would be.
+        let count = file.len();
+        file[count - between.len() + 1..].fill(0);
+        assert!(refusal(&file).contains("data follow its pixels"), "{between:?}");
+    }
+    for padding in ["", "\n", "\r\n", "\0\0"] {
+        let pixels = decode_grey(&pgm("\n", padding.as_bytes())).unwrap().pixels;
+        assert_eq!(pixels[[0, 1]], 1.0, "{padding:?}");
+    }
+}
+
+#[test]
 fn rejects_reversed_bits_and_padded_tiles_of_planes() {
     let reversed = tiff(CLASSIC, &[Page::grey(4, 3, 8, vec![1; 12]).with(266, &[2])]);
     assert!(refusal(&reversed).contains("FillOrder"));

@@ -6,7 +6,7 @@ use std::{
 };
 
 use super::{Planes, even, finite, moving, one_series, step_um, unescaped, unit_um};
-use crate::image_file::Page;
+use crate::{image_file::Page, order::composed};
 
 /// The first image of a file's OME-XML.
 pub(super) struct Metadata<'a>(Cow<'a, str>);
@@ -52,7 +52,13 @@ impl<'a> Metadata<'a> {
         let count = |name| number(self.pixels(), name).unwrap_or(1);
         let samples = pages.first().map_or(1, |page| page.directory.samples_per_pixel.max(1) as usize);
         one_series(count("SizeC") / samples.min(count("SizeC").max(1)), count("SizeT"))?;
-        let planes = count("SizeZ");
+        let (planes, images) = (count("SizeZ"), elements(&self.0, "Pixels").count());
+        if images > 1 && pages.len() > planes {
+            return Err(format!(
+                "it holds {images} images, such as positions of a stage: a stack is one focus series; save one of them (ImageJ: File > \
+                 Import > Bio-Formats)"
+            ));
+        }
         if planes != pages.len() {
             return Err(format!(
                 "its OME metadata have {planes} planes and the file has {}: give the file with all of them, or a folder of \
@@ -74,16 +80,16 @@ impl<'a> Metadata<'a> {
             if tag.starts_with("TiffData") {
                 at = ["FirstZ", "FirstC", "FirstT"].map(|name| number(tag, name).unwrap_or(0));
             } else if let (true, Some(name)) = (tag.starts_with("UUID"), attribute(tag, "FileName")) {
-                of_name.insert(unescaped(name), at);
+                of_name.insert(composed(&unescaped(name)), at);
             }
         }
         if of_name.len() < 2 {
             return Ok(None);
         }
         let known: Vec<[usize; 3]> =
-            names.iter().filter_map(|name| of_name.get(name.as_str()).copied()).collect();
+            names.iter().filter_map(|name| of_name.get(&composed(name)).copied()).collect();
         if known.len() < names.len() {
-            let name = names.iter().find(|name| !of_name.contains_key(name.as_str()));
+            let name = names.iter().find(|name| !of_name.contains_key(&composed(name)));
             return Err(format!(
                 "the OME metadata of its files are of {} files with other names, without {}: rename the files as they were, or save \
                  the stack again without them (Bio-Formats: bfconvert)",
@@ -224,6 +230,8 @@ mod tests {
         assert!(of(&pages(1, even)).unwrap_err().contains("3 planes"));
         let times = even.replace("SizeT=\"1\"", "SizeT=\"3\"").replace("SizeZ=\"3\"", "SizeZ=\"1\"");
         assert!(of(&pages(3, &times)).unwrap_err().contains("3 times"));
+        let two = even.replace("</OME>", "<Image><Pixels SizeZ='3'></Pixels></Image></OME>");
+        assert!(of(&pages(6, &two)).unwrap_err().contains("holds 2 images"));
     }
 
     #[test]
@@ -313,6 +321,9 @@ mod tests {
         let backslash = ome(&[data(0, 0, "a\\u0031"), data(1, 0, "a2")].concat());
         let backslash = backslash.replace("SizeZ='4'", "SizeZ='2'");
         assert_eq!(of(&backslash, &["a\\u0031", "a2"]).unwrap().unwrap().pages, [0, 1]);
+        // As a Mac names them.
+        let whole = backslash.replace("a\\u0031", "a\u{e4}1");
+        assert_eq!(of(&whole, &["aa\u{308}1", "a2"]).unwrap().unwrap().pages, [0, 1]);
     }
 
     #[test]

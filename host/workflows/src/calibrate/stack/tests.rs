@@ -1,17 +1,6 @@
 use super::*;
 
 #[test]
-fn the_pair_to_try_has_the_target_off_the_middle_of_its_range() {
-    for (focus, pair_step, slices) in
-        [(10.0, 10, 21), (6.2, 4, 13), (2.0, 4, 13), (10.5, 3, 13), (10.1, 2, 21)]
-    {
-        let far = telling_pair(focus, pair_step, slices);
-        let alpha = 2.0 * (focus - far as f64) / pair_step as f64 - 1.0;
-        assert!(far + pair_step < slices && (0.2..0.95).contains(&alpha.abs()), "{focus} {pair_step}: {far}");
-    }
-}
-
-#[test]
 fn a_path_in_a_command_is_one_word() {
     for (path, word) in [
         ("slices/05.png", "slices/05.png"),
@@ -140,4 +129,17 @@ fn camera_frames_even_out_the_slices_and_white_stays_white() {
         let expected = if at == (4, 5) { 1.0 } else { 100.0 / 255.0 };
         assert!((value - expected).abs() < 1e-5, "{at:?}: {value}");
     }
+}
+
+#[test]
+fn slices_of_integers_and_of_floats_have_no_common_scale() {
+    let folder = tempfile::tempdir().unwrap();
+    let slices = ["1.tif", "2.tif"].map(|name| folder.path().join(name));
+    let pixels = Array2::from_shape_fn((4, 5), |(y, x)| (5 * y + x) as u16);
+    let codes = farnear_files::image_file::encode_tiff(pixels.view(), 16).unwrap();
+    std::fs::write(&slices[0], codes).unwrap();
+    let values = farnear_files::map::tiff(pixels.mapv(f32::from).view()).unwrap();
+    std::fs::write(&slices[1], values).unwrap();
+    let error = read(&slices, &CalibrateStackRequest::default(), &Context::unattended()).unwrap_err();
+    assert!(error.is_usage() && error.to_string().contains("2.tif: expected pixels of one kind"), "{error}");
 }
