@@ -136,7 +136,7 @@ type Parts<'py> = (
 );
 
 impl DepthMap {
-    pub fn of(py: Python<'_>, found: Measurement, optics: &Optics) -> Self {
+    pub fn of(py: Python<'_>, found: Measurement, optics: &Optics, part: Option<Part>) -> Self {
         let validity = found.validity;
         Self {
             depth_mm: found.map.depth_mm.into_pyarray(py).unbind(),

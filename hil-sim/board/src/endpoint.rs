@@ -291,7 +291,7 @@ mod tests {
         let mut first = connect(address);
         tell(&mut first, run(40_000));
         assert_eq!(hear.recv_timeout(LONG), Ok(run(40_000)));
-        // The sender has noticed before the reader that the client is gone.
+        // The sender notices before the reader that the client has left.
         forget(&shared, 0);
         let end = hear.try_recv();
         assert!(matches!(end, Ok(Control::FreeRun { period: Micros(0), .. })), "{end:?}");

@@ -27,7 +27,6 @@ use crate::prepare::{
 };
 use crate::psf::Psf;
 use crate::reason::Reason;
-use crate::simd::{self, Backend};
 use crate::validity::{Lost, Validity, ValiditySettings, assess};
 pub use finding::Finding;
 use scaled_blur::undo_scaled_blur;

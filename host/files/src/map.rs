@@ -78,7 +78,7 @@ pub fn read_with_nodata(path: &Path) -> Result<(Array2<f32>, Option<NoData>), Ma
     }
     let directory = directory(&bytes, page).unwrap_or_default();
     if is_scaled(&directory) {
-        let reason = "GDAL's metadata scale or shift its values: store the depths themselves (`gdal_translate -unscale -ot Float32`)";
+        let reason = "GDAL's metadata scale or shift its values: store the depths themselves as floats (`gdal_translate -unscale`)";
         return Err(refused(reason.into()));
     }
     let mut values = image.pixels;

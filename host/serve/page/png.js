@@ -1,4 +1,4 @@
-// PNG as numbers. A browser that protects against fingerprinting changes what is read from a canvas, so grey images are decoded here.
+// PNG as numbers. A browser that protects against fingerprinting changes the values of a canvas, so grey images are decoded here.
 import { h } from "./ui.js";
 
 const [IHDR, IDAT] = [0x49484452, 0x49444154];

@@ -175,7 +175,7 @@ test("a plot and a histogram tell their range, their largest value and how many 
   assert.match(await plot.getAttribute("aria-label"), /: depth, \d{3} values from [\d.]+ to [\d.]+, the largest at \d+/);
 });
 
-test("reasons are right where a browser changes what is read from a canvas, and the surface does not keep their legend", async () => {
+test("reasons are right where a browser changes the values of a canvas, and the surface does not keep their legend", async () => {
   const context = await browser.newContext();
   await context.addInitScript(() => {
     const { getImageData } = CanvasRenderingContext2D.prototype;

@@ -71,7 +71,7 @@ fn deviations_cover_even_curvature() {
     };
     let found = measured([image(lens.sensor_far_mm, 0), image(lens.sensor_near_mm, 1)]);
     let within = within_three(&found, &truth(&scene, &lens, &camera));
-    let part = within.slice(s![16..-16, 16..-16]).mean().unwrap();
+    let part = within.slice(s![16..height - 16, 16..width - 16]).mean().unwrap();
     // Without the curvature over the window 0.93.
     assert!(part > 0.95, "{part}");
 }

@@ -136,7 +136,7 @@ fn needs_more(bytes: &[u8], values: &[u8], options: DecoderOptions, to: ColorSpa
 /// Whether what follows the pixels of a file, `size` bytes of them, is padding. A second line end or a comment before them counts as
 /// pixels, so the last pixels would remain.
 fn is_padding(file: &[u8], after: &[u8], size: usize) -> bool {
-    let before = file.len().checked_sub(after.len() + size).unwrap_or_default();
+    let before = file.len().saturating_sub(after.len() + size);
     let (header, pixels) = file.split_at(before);
     let is_shifted = pixels.starts_with(b"#") || header.ends_with(b"\r") && pixels.starts_with(b"\n");
     after.is_empty() || !is_shifted && after.iter().all(|byte| byte.is_ascii_whitespace() || *byte == 0)
