@@ -229,7 +229,7 @@ impl Optics {
         -self.focal_length_mm * self.focal_length_mm * slope / (w * w)
     }
 
-    /// Magnitude of that slope relative to the square of the distance beyond the focal length, which it is proportional to, 1/mm.
+    /// Magnitude of the slope of depth against alpha, which is `steepness (z - F)^2` at the depth z, 1/mm.
     pub fn steepness(&self) -> f64 {
         let [_, slope] = self.defocus_line_mm();
         slope.abs() / self.focal_length_mm.powi(2)

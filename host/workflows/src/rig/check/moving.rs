@@ -1,7 +1,7 @@
 //! Steps with motion: homing, full speed, halt, piezo, camera.
 
 use farnear_capture::{
-    ClientError,
+    Client, ClientError,
     describe::{axis_name, um},
     expose::{CaptureError, expose},
     ready::steppers,
@@ -21,6 +21,8 @@ use super::{Checkup, EquippedRig, Found, failed, passed, passed_over};
 const SLOW_NM_PER_S: i32 = 500_000;
 /// Largest difference between two homings.
 const REPEATS_UM: f64 = 1.5;
+/// Attempts to halt a move: a busy computer may ask after its end.
+const HALTS: usize = 3;
 /// Exposures of the strobe check.
 const EXPOSURES: u16 = 5;
 
@@ -106,25 +108,45 @@ pub(super) fn full_speed(checkup: &mut Checkup<'_>) -> Found {
     passed(format!("to the middle of the travel; off by {}", said.join(", ")))
 }
 
+fn clear_alarm(client: &Client) -> Result<(), ClientError> {
+    match client.status()?.alarm {
+        Some(record) => client.clear_alarm(record.number),
+        None => Ok(()),
+    }
+}
+
 /// Halts in mid-move. The alarm must be latched, refuse requests, and clear.
 pub(super) fn halt(checkup: &mut Checkup<'_>) -> Found {
     let client = checkup.client();
     let Some(axis) = steppers(&client.hello().capabilities).first().copied() else {
         return passed_over("the rig has no stepper");
     };
-    let (min, _) = range(axis, &client.hello().limits);
-    let work = client.start_move(axis, Nanometres(min))?;
-    client.halt()?;
-    match work.moved() {
-        Err(ClientError::Failed { alarm: Some(record), .. }) if record.alarm == Alarm::Halt => {}
-        Err(error) => return Err(error.into()),
-        Ok(_) => return failed("the move went on"),
+    let (min, max) = range(axis, &client.hello().limits);
+    let mut is_halted = false;
+    for attempt in 0..HALTS {
+        if attempt > 0 {
+            clear_alarm(client)?;
+            client.home(axis)?;
+            client.move_to(axis, Nanometres(min + (max - min) / 2))?;
+        }
+        let work = client.start_move(axis, Nanometres(min))?;
+        client.halt()?;
+        match work.moved() {
+            Err(ClientError::Failed { alarm: Some(record), .. }) if record.alarm == Alarm::Halt => {
+                is_halted = true;
+                break;
+            }
+            Err(error) => return Err(error.into()),
+            Ok(_) => {}
+        }
+    }
+    if !is_halted {
+        return failed("the move went on");
     }
     if client.move_to(axis, Nanometres(min)).is_ok() {
         return failed("the rig moved though the alarm was latched");
     }
-    let number = client.status()?.alarm.map_or(0, |record| record.number);
-    client.clear_alarm(number)?;
+    clear_alarm(client)?;
     let refused = client.move_to(axis, Nanometres(min));
     if refused.is_ok() {
         return failed("the rig moved though its position was lost");
