@@ -45,7 +45,8 @@ impl Correction {
         let mut maps = Vec::with_capacity(patterns.len());
         for (index, (map, true_mm)) in patterns.iter().enumerate() {
             let map: Map<'_> = named(&format!("patterns[{index}][0]"), map)?;
-            check_distance(index, &Pattern { depth_mm: map.view(), true_mm: *true_mm }).map_err(wrong)?;
+            let pattern = Pattern { depth_mm: map.view(), true_mm: *true_mm };
+            check_distance(&format!("patterns[{index}]"), &pattern).map_err(wrong)?;
             maps.push((map.view().to_owned(), *true_mm));
         }
         let fit = move || {

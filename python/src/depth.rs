@@ -231,24 +231,22 @@ impl Bin {
         has_operators: bool,
         doubts: &mut Vec<OpticsDoubt>,
     ) -> PyResult<usize> {
-        // Pixels are averaged only on request, or for optics that were calibrated so.
-        let alone = self.0 == Some(1) || self.0.is_none() && has_operators;
-        if alone {
-            let (blur_px, bin) = (optics.max_blur_px(), usable_bin(optics));
-            doubts.extend((bin > 1).then_some(OpticsDoubt::TooMuchBlur { blur_px, bin, binned: false }));
-        }
-        match self.0 {
-            Some(side @ 2..) if has_operators || optics.stage().is_some() => {
-                Err(FarnearError::new_err(format!(
+        // Operators are for pixels of one size.
+        let bin = if has_operators { self.0.or(Some(1)) } else { self.0 };
+        match bin {
+            Some(1) => {
+                let (blur_px, bin) = (optics.max_blur_px(), usable_bin(optics));
+                doubts.extend((bin > 1).then_some(OpticsDoubt::TooMuchBlur { blur_px, bin, binned: false }));
+            }
+            Some(side) if has_operators || optics.stage().is_some() => {
+                return Err(FarnearError::new_err(format!(
                     "bin is {side}; operators and optics of calibrate_stack are for pixels of one size: give no bin"
-                )))
+                )));
             }
-            bin => {
-                let bin = if alone { Some(1) } else { bin };
-                let request = DepthRequest { bin, ..DepthRequest::default() };
-                Ok(request.bin_for(optics, !alone && is_mosaic(far.view()), doubts))
-            }
+            _ => {}
         }
+        let request = DepthRequest { bin, ..DepthRequest::default() };
+        Ok(request.bin_for(optics, bin != Some(1) && is_mosaic(far.view()), doubts))
     }
 }
 

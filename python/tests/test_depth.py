@@ -161,7 +161,7 @@ def test_corrections_take_a_bowl_away(tmp_path):
         file = tmp_path / "correction.toml"
         file.write_text(correction.dumps())
         assert np.array_equal(farnear.Correction.load(file).apply(910 + bowl), corrected)
-    with pytest.raises(farnear.FarnearError, match="0.932 of pattern 1.*in mm"):
+    with pytest.raises(farnear.FarnearError, match=r"0.932 of patterns\[0\].*in mm"):
         farnear.Correction.fit([(depth, true / 1000) for depth, true in targets], method="clsf")
     with pytest.raises(farnear.FarnearError, match="4"):
         farnear.Correction.fit(targets[:2], method="clsf")

@@ -171,6 +171,19 @@ pub enum CameraError {
     Late { camera: String, trigger_number: u32, waited: Duration },
     #[error("the camera skipped exposure {wanted}: it sent the image of exposure {came}")]
     Skipped { wanted: u32, came: u32 },
+    #[error(
+        "the image of exposure {trigger_number} has {width}x{height} pixels of {bits} bits, expected {first_width}x{first_height} of \
+         {first_bits} as before: let nothing change the camera's size or format during a program"
+    )]
+    Reformatted {
+        trigger_number: u32,
+        width: usize,
+        height: usize,
+        bits: u8,
+        first_width: usize,
+        first_height: usize,
+        first_bits: u8,
+    },
     #[error("cannot look into the camera's folder {}: {source}", folder.display())]
     Folder { folder: PathBuf, source: std::io::Error },
     #[error("{} cannot be used: {reason}", path.display())]

@@ -207,7 +207,7 @@ impl<'c> Continuous<'c> {
         match wait_for_image(&self.client, self.camera, &record, self.image_wait) {
             Ok(image) => {
                 self.undelivered = 0;
-                self.format.check(&image, record.trigger_number)?;
+                self.format.check(&image, record.trigger_number).map_err(CaptureError::Camera)?;
                 Ok(Outcome::Taken(Box::new(Frame { number, deviation, record, image })))
             }
             Err(CaptureError::Camera(

@@ -40,19 +40,6 @@ pub enum CaptureError {
         near_height: usize,
         near_bits: u8,
     },
-    #[error(
-        "the image of exposure {trigger_number} has {width}x{height} pixels of {bits} bits, expected {first_width}x{first_height} of \
-         {first_bits} as before: let nothing change the camera's size or format during a program"
-    )]
-    Reformatted {
-        trigger_number: u32,
-        width: usize,
-        height: usize,
-        bits: u8,
-        first_width: usize,
-        first_height: usize,
-        first_bits: u8,
-    },
     #[error("the board reported {reported} exposures, {asked} were requested")]
     Count { reported: usize, asked: usize },
     #[error(
@@ -87,9 +74,10 @@ pub fn expose_in_parts<E: From<CaptureError> + From<ClientError>>(
     mut on_image: impl FnMut(usize, ShotRecord, Image) -> Result<(), E>,
 ) -> Result<(), E> {
     let length = usize::from(client.hello().limits.shots_max.max(1));
+    let formats = &mut [Format::default()];
     with_armed(&mut [camera], shots, |cameras| {
         shots.chunks(length).enumerate().try_for_each(|(part, shots)| {
-            run_armed(client, cameras, shots, image_wait, |_, record, image| {
+            run_armed(client, cameras, formats, shots, image_wait, |_, record, image| {
                 let (index, asked) = (usize::from(record.index), shots.len());
                 if index >= asked {
                     return Err(CaptureError::Count { reported: index + 1, asked }.into());
@@ -108,7 +96,8 @@ pub fn expose_together<E: From<CaptureError> + From<ClientError>>(
     image_wait: Duration,
     on_image: impl FnMut(usize, ShotRecord, Image) -> Result<(), E>,
 ) -> Result<(), E> {
-    with_armed(cameras, shots, |cameras| run_armed(client, cameras, shots, image_wait, on_image))
+    let formats = &mut vec![Format::default(); cameras.len()];
+    with_armed(cameras, shots, |cameras| run_armed(client, cameras, formats, shots, image_wait, on_image))
 }
 
 /// An exposure by an armed camera, whose count and time stamps later frames are compared with.
@@ -119,7 +108,7 @@ pub(crate) fn expose_first(
     image_wait: Duration,
 ) -> Result<(), CaptureError> {
     let once = [Shot { repeat: 1, ..shot }];
-    run_armed(client, &mut [camera], &once, image_wait, |_, _, _| Ok(()))
+    run_armed(client, &mut [camera], &mut [Format::default()], &once, image_wait, |_, _, _| Ok(()))
 }
 
 fn of_camera(at: usize, count: usize) -> impl Fn(CameraError) -> CaptureError {
@@ -135,12 +124,12 @@ pub(crate) struct Format(Option<((usize, usize), u8)>);
 
 impl Format {
     /// Fails for an image unlike the first one.
-    pub(crate) fn check(&mut self, image: &Image, trigger_number: u32) -> Result<(), CaptureError> {
+    pub(crate) fn check(&mut self, image: &Image, trigger_number: u32) -> Result<(), CameraError> {
         let now @ ((height, width), bits) = (image.pixels.dim(), image.bits);
         let first @ ((first_height, first_width), first_bits) = *self.0.get_or_insert(now);
         match now == first {
             true => Ok(()),
-            false => Err(CaptureError::Reformatted {
+            false => Err(CameraError::Reformatted {
                 trigger_number,
                 width,
                 height,
@@ -181,16 +170,16 @@ fn with_armed<E: From<CaptureError>>(
     Ok(())
 }
 
-/// Runs one program with armed cameras.
+/// Runs one program with armed cameras, each with the format of its earlier images.
 fn run_armed<E: From<CaptureError> + From<ClientError>>(
     client: &Client,
     cameras: &mut [&mut dyn Camera],
+    formats: &mut [Format],
     shots: &[Shot],
     image_wait: Duration,
     mut on_image: impl FnMut(usize, ShotRecord, Image) -> Result<(), E>,
 ) -> Result<(), E> {
     let count = cameras.len();
-    let mut formats = vec![Format::default(); count];
     let mut reported = 0;
     run_program(client, shots, |kind, received| -> Result<(), E> {
         match kind {
@@ -201,14 +190,14 @@ fn run_armed<E: From<CaptureError> + From<ClientError>>(
             }
             EventKind::ShotDone { shot, .. } => {
                 reported += 1;
-                for ((at, camera), format) in cameras.iter_mut().enumerate().zip(&mut formats) {
+                for ((at, camera), format) in cameras.iter_mut().enumerate().zip(&mut *formats) {
                     camera.reported(shot, received);
                     let image = wait_for_image(client, &mut **camera, shot, image_wait);
                     let image = image.map_err(|error| match error {
                         CaptureError::Camera(source) => of_camera(at, count)(source),
                         other => other,
                     })?;
-                    format.check(&image, shot.trigger_number)?;
+                    format.check(&image, shot.trigger_number).map_err(of_camera(at, count))?;
                     on_image(at, *shot, image)?;
                 }
             }

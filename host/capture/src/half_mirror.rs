@@ -36,12 +36,10 @@ pub fn capture_behind_mirror(
         reported += 1;
         match taken.get_mut(at) {
             Some(Some((_, average))) => average.add(&image),
-            Some(none) => {
-                *none = Some((record, Average::of(image)));
-                Ok(())
-            }
-            None => Err(CaptureError::Count { reported, asked }),
+            Some(none) => *none = Some((record, Average::of(image))),
+            None => return Err(CaptureError::Count { reported, asked }),
         }
+        Ok(())
     });
     images?;
     let [Some(far), Some(near)] = taken else { return Err(CaptureError::Count { reported, asked }) };

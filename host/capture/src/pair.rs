@@ -147,7 +147,7 @@ pub fn capture_pair(
     expose(lit, camera, &shots, exposures.image_wait, |record, image| -> Result<(), CaptureError> {
         reported += 1;
         match taken.get_mut(usize::from(record.index)) {
-            Some(Some((_, average))) => average.add(&image)?,
+            Some(Some((_, average))) => average.add(&image),
             Some(none) => *none = Some((record, Average::of(image))),
             None => return Err(CaptureError::Count { reported, asked }),
         }

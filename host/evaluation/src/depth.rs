@@ -14,6 +14,7 @@ mod planes;
 pub mod real;
 mod shapes;
 mod stacks;
+mod surfaces;
 mod uncertainty;
 
 use anyhow::Result;
@@ -22,7 +23,7 @@ use crate::page::Page;
 
 type Part = (&'static str, fn(&mut Page) -> Result<()>);
 
-pub const RENDERED: [Part; 12] = [
+pub const RENDERED: [Part; 13] = [
     ("planes", planes::measure),
     ("shapes", shapes::measure),
     ("mismatch", mismatch::measure),
@@ -31,6 +32,7 @@ pub const RENDERED: [Part; 12] = [
     ("kernels", kernels::measure),
     ("fill", fill::measure),
     ("uncertainty", uncertainty::measure),
+    ("surfaces", surfaces::measure),
     ("calibration", calibration::measure),
     ("coded", coded::measure),
     ("corrections", corrections::measure),

@@ -11,9 +11,6 @@ mod large_region;
 mod physical;
 mod small_region;
 
-use std::fmt;
-use std::str::FromStr;
-
 pub use images::{Images, ImagesError};
 
 use farnear_silhouettes::mask::Mask;
@@ -41,18 +38,16 @@ impl Method {
         Self::SmallRegionTexture,
         Self::LargeRegionTexture,
     ];
-
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Chromaticity => "chromaticity",
-            Self::Physical => "physical",
-            Self::Geometry => "geometry",
-            Self::SmallRegionTexture => "small-region-texture",
-            Self::LargeRegionTexture => "large-region-texture",
-        }
-    }
 }
+
+farnear_silhouettes::named!(
+    Method, "shadow detector",
+    "chromaticity" => Chromaticity,
+    "physical" => Physical,
+    "geometry" => Geometry,
+    "small-region-texture" => SmallRegionTexture,
+    "large-region-texture" => LargeRegionTexture
+);
 
 #[derive(Clone, Debug)]
 pub struct Detector {
@@ -78,26 +73,6 @@ impl Detector {
     }
 }
 
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "`{0}` is not a shadow detector; choose chromaticity, physical, geometry, small-region-texture or large-region-texture"
-)]
-pub struct UnknownMethod(pub String);
-
-impl fmt::Display for Method {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Method {
-    type Err = UnknownMethod;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Self::ALL.into_iter().find(|method| method.name() == text).ok_or_else(|| UnknownMethod(text.into()))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -105,7 +80,7 @@ mod tests {
     #[test]
     fn names_round_trip() {
         for method in Method::ALL {
-            assert_eq!(method.name().parse(), Ok(method));
+            assert_eq!(method.to_string().parse(), Ok(method));
         }
         assert!("colour".parse::<Method>().unwrap_err().to_string().contains("chromaticity"));
     }

@@ -1,4 +1,4 @@
-/// Shows an enum's variants by name, and reads the names.
+/// `Display` and `FromStr` of an enum by the names of its variants. `$what` is the noun of the error, such as "fill".
 #[macro_export]
 macro_rules! named {
     ($type:ident, $what:literal, $($name:literal => $variant:ident),+) => {

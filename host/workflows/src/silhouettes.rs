@@ -60,7 +60,7 @@ pub enum SilhouettesError {
     TooMany { count: usize, limit: usize, every: usize },
     #[error("no performance to draw")]
     NoPerformance,
-    #[error("the shadow detector {} compares colours, but the video is grey", method.name())]
+    #[error("the shadow detector {method} compares colours, but the video is grey")]
     NeedsColour { method: Method },
 }
 

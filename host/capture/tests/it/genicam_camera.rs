@@ -174,12 +174,8 @@ fn arming_ends_automatics_and_gamma_and_keeps_the_falling_edge() {
         ("<pValue>TriggerActivationRegister</pValue>", edge),
         ("<Enumeration Name=\"GainAuto\"", &number("Gamma", 0x8000, 0.1)),
     ]);
-    let other = aravis::Camera::new(Some(ID)).unwrap();
-    for (name, entry) in
-        [("GainAuto", "Continuous"), ("TriggerSelector", "FrameStart"), ("TriggerActivation", "FallingEdge")]
-    {
-        other.set_string(name, entry).unwrap();
-    }
+    let other = with_falling_edge();
+    other.set_string("GainAuto", "Continuous").unwrap();
     other.set_float("Gamma", 0.5).unwrap();
     drop(other);
     let mut camera = fake.open();
@@ -190,12 +186,13 @@ fn arming_ends_automatics_and_gamma_and_keeps_the_falling_edge() {
     assert_eq!(values(&mut camera, names), all(["Off", "1", "FallingEdge"]));
 }
 
-/// Opened by another program, which sets the falling edge.
-fn set_falling_edge() {
+/// The camera as another program opens it, with the falling edge set.
+fn with_falling_edge() -> aravis::Camera {
     let other = aravis::Camera::new(Some(ID)).unwrap();
     for (name, entry) in [("TriggerSelector", "FrameStart"), ("TriggerActivation", "FallingEdge")] {
         other.set_string(name, entry).unwrap();
     }
+    other
 }
 
 #[test]
@@ -210,7 +207,7 @@ fn a_refused_trigger_source_does_not_change_the_edge() {
         ),
         ("TriggerSource\" NameSpace=\"Standard\"", source),
     ]);
-    set_falling_edge();
+    drop(with_falling_edge());
     let mut camera = fake.open();
     let error = camera.arm(TriggerMode::Software, EXPOSURE).unwrap_err();
     assert!(matches!(error, CameraError::Unusable { .. }), "{error:?}");

@@ -91,8 +91,9 @@ fn a_camera_that_changes_its_size_during_a_program_is_refused() {
     // The second image is the dark one of the first.
     let ambient = Exposures { subtract_ambient: true, ..exposures() };
     let error = capture_pair(&client, &mut camera, &SENSOR, &ambient, &mut |_| {}).unwrap_err();
+    let CaptureError::Camera(error) = error else { panic!("{error:?}") };
     let refused =
-        matches!(error, CaptureError::Reformatted { trigger_number: 1, width: 2, first_width: 4, .. });
+        matches!(error, CameraError::Reformatted { trigger_number: 1, width: 2, first_width: 4, .. });
     assert!(refused, "{error:?}");
 }
 

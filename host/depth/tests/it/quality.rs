@@ -61,8 +61,8 @@ fn deviations_at_the_border_cover_its_slope() {
 fn deviations_cover_even_curvature() {
     let (width, height) = (320, 240);
     let (lens, camera) = (lens(), Camera::new(width, height, Noise::EightBit));
-    // Waves of half the working range, on which windows of 21 px lose 0.2 mm at crests and hardly differ from smaller ones.
-    let wave = |column: usize| 909.9 + 11.5 * (column as f32 * std::f32::consts::TAU / 200.0).sin();
+    // A wave of most of the working range, on whose crests windows of 21 px lose 0.13 mm and hardly differ from smaller ones.
+    let wave = |column: usize| 909.9 + 18.5 * (column as f32 * std::f32::consts::TAU / 320.0).sin();
     let map = Array2::from_shape_fn((height, width), |(_, column)| wave(column));
     let scene = Scene::new(Shape::HeightMap(HeightMap::new(map).unwrap()));
     let renderer = Renderer::new(&scene, &lens, &PSF.parse().unwrap(), &camera, 4).unwrap();
@@ -72,6 +72,6 @@ fn deviations_cover_even_curvature() {
     let found = measured([image(lens.sensor_far_mm, 0), image(lens.sensor_near_mm, 1)]);
     let within = within_three(&found, &truth(&scene, &lens, &camera));
     let part = within.slice(s![16..height - 16, 16..width - 16]).mean().unwrap();
-    // Without the curvature over the window 0.93.
-    assert!(part > 0.95, "{part}");
+    // 0.988 to 0.991 by three seeds; without the curvature over the window 0.966 to 0.974.
+    assert!(part > 0.98, "{part}");
 }

@@ -55,7 +55,7 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
         .par_iter()
         .map(|&method| {
             let score = detected(kind, method, 0..MADE_SCENES)?;
-            Ok(row(name, &format!("`{}`", method.name()), &score))
+            Ok(row(name, &format!("`{method}`"), &score))
         })
         .collect::<Result<Vec<_>>>()?;
     for (method, cutter) in CUTTERS {
@@ -104,7 +104,7 @@ pub fn per_scene(scenes: u64) -> Result<Vec<(String, Vec<ShadowScore>)>> {
     let mut found = Vec::new();
     for method in Method::ALL {
         let scores = (0..scenes).map(|seed| detected(Kind::Standard, method, seed..seed + 1));
-        found.push((method.name().to_owned(), scores.collect::<Result<Vec<_>>>()?));
+        found.push((method.to_string(), scores.collect::<Result<Vec<_>>>()?));
     }
     for (name, cutter) in [("thesis", Cutter::Thesis), ("hybrid", Cutter::Hybrid)] {
         let scores = (0..scenes).map(|seed| pooled(Kind::Standard, cutter, seed..seed + 1));
@@ -182,7 +182,7 @@ fn highway(page: &mut Page, folder: &Path) -> Result<()> {
     let name = "highway";
     let mut rows =
         vec![row(name, "nothing removed", &plain), row(name, "the model's own shadow option", &own)];
-    rows.extend(detectors.iter().map(|(method, _, score)| row(name, &format!("`{}`", method.name()), score)));
+    rows.extend(detectors.iter().map(|(method, _, score)| row(name, &format!("`{method}`"), score)));
     page.table(2, &HEAD, &rows);
     Ok(())
 }

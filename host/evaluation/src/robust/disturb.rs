@@ -235,7 +235,7 @@ mod tests {
         let optics = rig::optics(PSF).unwrap();
         let operators = Operators::for_optics(&optics).unwrap();
         let scene = "staircase".parse().unwrap();
-        for (quality, least_valid) in [(95, 0.99), (50, 0.8)] {
+        for (quality, least_valid) in [(95, 0.99), (75, 0.95), (50, 0.8)] {
             let jpeg = Disturbance { jpeg: Some(quality), ..Disturbance::default() };
             let taken = take(&scene, (320, 240), &jpeg, 3).unwrap();
             let outcome = taken.measure(1, &operators, &optics, None);

@@ -39,7 +39,7 @@ fn reaches(method: Method, removed: f64, wrongly: f64) {
     let found = (percent(score.removed_percent()), percent(score.wrongly_removed_percent()));
     println!(
         "{}: {:.1} % of the shadow removed, {:.1} % of the subject wrongly, intersection over union {:.1} %",
-        method.name(),
+        method,
         found.0,
         found.1,
         percent(score.iou_percent())

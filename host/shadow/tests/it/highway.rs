@@ -149,9 +149,8 @@ fn detectors_keep_most_of_what_moves() {
         let discrimination = 100.0 - score.wrongly_removed_percent().unwrap();
         println!(
             "{}: detection {detection}, discrimination {discrimination:.1} % of {} pixels",
-            method.name(),
-            score.subject_pixels
+            method, score.subject_pixels
         );
-        assert!(discrimination > 40.0, "{}: {discrimination:.1} %", method.name());
+        assert!(discrimination > 40.0, "{}: {discrimination:.1} %", method);
     }
 }

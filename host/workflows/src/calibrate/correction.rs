@@ -106,7 +106,7 @@ pub fn learn(settings: &CalibrateCorrectionRequest, context: &Context<'_>) -> Re
         maps.iter().map(|(map, true_mm)| Pattern { depth_mm: map.view(), true_mm: *true_mm }).collect();
     let cdc = CdcSettings { window: settings.window_px, smoothing_px: settings.smoothing_px };
     for (index, pattern) in patterns.iter().enumerate() {
-        check_distance(index, pattern)?;
+        check_distance(&format!("pattern {}", index + 1), pattern)?;
     }
     let correction = fit(settings.method, &patterns, &cdc)?;
     let (far_mm, near_mm) = correction.range_mm();
@@ -177,14 +177,14 @@ pub fn list(list: &Path) -> Result<Vec<(PathBuf, f64)>> {
 }
 
 /// Refuses a distance in another unit.
-pub fn check_distance(index: usize, pattern: &Pattern<'_>) -> Result<()> {
+pub fn check_distance(name: &str, pattern: &Pattern<'_>) -> Result<()> {
     let Some(median) = quantile::of_values(depths(pattern.depth_mm).map(f64::from), 0.5) else {
         return Ok(());
     };
     if (1.0 / LARGEST_RATIO..=LARGEST_RATIO).contains(&(pattern.true_mm / median)) {
         return Ok(());
     }
-    let value = format!("{} of pattern {}", pattern.true_mm, index + 1);
+    let value = format!("{} of {name}", pattern.true_mm);
     let expected = format!("expected the target's distance in mm; the median of its map is {median:.3} mm");
     Err(WorkflowError::parameter("true_mm", value, expected))
 }
@@ -230,8 +230,8 @@ mod tests {
     fn a_distance_in_metres_is_refused_and_a_wrong_one_is_named() {
         let map = Array2::from_elem((4, 4), 905.0_f32);
         let pattern = |true_mm| Pattern { depth_mm: map.view(), true_mm };
-        assert!(check_distance(0, &pattern(900.0)).is_ok());
-        let error = check_distance(2, &pattern(0.9)).unwrap_err().to_string();
+        assert!(check_distance("pattern 1", &pattern(900.0)).is_ok());
+        let error = check_distance("pattern 3", &pattern(0.9)).unwrap_err().to_string();
         assert!(error.contains("0.9 of pattern 3") && error.contains("905.000 mm"), "{error}");
         let maps = vec![(map.clone(), 904.0), (map.clone(), 905.5), (map.clone(), 904.5), (map, 925.0)];
         let found = unlike_others(&errors(&maps, None).unwrap());
