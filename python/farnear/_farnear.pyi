@@ -88,9 +88,9 @@ class Optics:
         """Read an `optics.toml` file."""
     @staticmethod
     def loads(text: str) -> "Optics":
-        """Read optics from the text of an `optics.toml`."""
+        """Read optics from the text of an `optics.toml`. Without a `[psf]` a pill-box is assumed, which is a finding of `depth`."""
     def dumps(self) -> str:
-        """Text of an `optics.toml` with these optics."""
+        """Text of an `optics.toml` with these optics, without `[psf]` if their file named none."""
     def depth_mm(self, alpha: float) -> float:
         """Object distance in mm of a normalised depth (-1 at the far focus, +1 at the near focus)."""
     def alpha(self, depth_mm: float) -> float:
@@ -610,6 +610,9 @@ class Correction:
     @property
     def range_mm(self) -> tuple[float, float]:
         """True distances in mm of the farthest and the nearest target."""
+    @property
+    def findings(self) -> list[str]:
+        """Targets whose error stays unusually large after the correction, for example because of a wrong distance. Empty after `load`."""
 
 class PsfFit:
     """A calibrated point spread function, as `calibrate_psf` returns it. Can be pickled and copied.

@@ -383,7 +383,12 @@ class EmulatedRig:
         if optics is not None:
             command += ["--optics", os.fspath(optics)]
         self._process = subprocess.Popen(
-            [*command, *more], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
+            [*command, *more],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            start_new_session=True,  # Ctrl-C first stops all motion; on Windows by the flag
+            creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
         )
         assert self._process.stdout is not None
         line = self._process.stdout.readline()

@@ -184,7 +184,7 @@ pub fn calibrate_psf<'py>(
     })??;
     let findings = is_raw.then(|| mosaic::WORDS.to_owned()).into_iter().chain(doubt(&fit, model)).collect();
     Ok(PsfFit {
-        optics: Optics(lens.with_psf(fit.psf)),
+        optics: lens.with_psf(fit.psf).into(),
         psf: psf_text(fit.psf)?,
         verdict: fit.verdict().to_string(),
         findings,

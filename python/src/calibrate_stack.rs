@@ -202,6 +202,6 @@ pub fn calibrate_stack<'py>(
         within_three: held_out.within_three,
         by_depth: by_depth.into_pyarray(py).unbind(),
         response: Array2::from(stage.curve().to_vec()).into_pyarray(py).unbind(),
-        optics: Optics(found.optics),
+        optics: found.optics.into(),
     })
 }

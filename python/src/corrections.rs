@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use farnear_depth::corrections::{self, CdcSettings, Method, Pattern};
-use farnear_workflows::calibrate::correction::check_distance;
+use farnear_workflows::calibrate::correction::{check_distance, errors, unlike_others};
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::prelude::*;
 
@@ -25,7 +25,16 @@ use crate::{
 /// >>> farnear.Correction.fit(targets, method="clsf")
 /// Correction(clsf, 120x160, 932 to 888 mm)
 #[pyclass(frozen, module = "farnear")]
-pub struct Correction(corrections::Correction);
+pub struct Correction {
+    correction: corrections::Correction,
+    findings: Vec<String>,
+}
+
+impl From<corrections::Correction> for Correction {
+    fn from(correction: corrections::Correction) -> Self {
+        Self { correction, findings: Vec::new() }
+    }
+}
 
 #[pymethods]
 impl Correction {
@@ -54,15 +63,18 @@ impl Correction {
                 .iter()
                 .map(|(map, true_mm)| Pattern { depth_mm: map.view(), true_mm: *true_mm })
                 .collect();
-            corrections::fit(method, &patterns, &CdcSettings::default())
+            let correction = corrections::fit(method, &patterns, &CdcSettings::default()).map_err(wrong)?;
+            let errors = errors(&maps, Some(&correction)).map_err(wrong)?;
+            let findings = unlike_others(&errors, |index| format!("patterns[{index}]"));
+            Ok::<_, PyErr>(Self { correction, findings })
         };
-        work::watched(py, fit)?.map(Self).map_err(wrong)
+        work::watched(py, fit)?
     }
 
     /// Read a correction from the TOML that `farnear calibrate correction --out` writes.
     #[staticmethod]
     fn loads(py: Python<'_>, text: &str) -> PyResult<Self> {
-        py.detach(|| toml::from_str(text)).map(Self).map_err(wrong)
+        py.detach(|| toml::from_str::<corrections::Correction>(text)).map(Self::from).map_err(wrong)
     }
 
     /// Read a file that `farnear calibrate correction --out` wrote.
@@ -72,13 +84,21 @@ impl Correction {
         Self::loads(py, &text).map_err(|error| FarnearError::new_err(format!("{}: {error}", path.display())))
     }
 
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
-        Ok((py.get_type::<Self>().getattr("loads")?, (self.dumps(py)?,)))
+    /// For pickle and copy.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String, Vec<String>))> {
+        let parts = (self.dumps(py)?, self.findings.clone());
+        Ok((py.get_type::<Self>().getattr("_assemble")?, parts))
+    }
+
+    /// A correction from its parts, for pickle.
+    #[staticmethod]
+    fn _assemble(py: Python<'_>, text: &str, findings: Vec<String>) -> PyResult<Self> {
+        Ok(Self { findings, ..Self::loads(py, text)? })
     }
 
     /// TOML of the correction, as `farnear correct --correction` reads it.
     fn dumps(&self, py: Python<'_>) -> PyResult<String> {
-        py.detach(|| toml::to_string(&self.0)).map_err(wrong)
+        py.detach(|| toml::to_string(&self.correction)).map_err(wrong)
     }
 
     /// Correct a depth map. `depth_mm` is (height, width) in mm. Returns float32 (height, width) in mm; NaN stays NaN, and depths beyond the fitted range become NaN.
@@ -89,29 +109,35 @@ impl Correction {
     ) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let map: Map<'py> = named("depth_mm", depth_mm)?;
         let map = map.view();
-        Ok(work::run(py, || self.0.apply(map))?.map_err(wrong)?.into_pyarray(py))
+        Ok(work::run(py, || self.correction.apply(map))?.map_err(wrong)?.into_pyarray(py))
     }
 
     /// Method of the correction.
     #[getter]
     fn method(&self) -> String {
-        self.0.method().to_string()
+        self.correction.method().to_string()
     }
 
     /// (height, width) of the maps that it corrects.
     #[getter]
     fn shape(&self) -> (usize, usize) {
-        self.0.dim()
+        self.correction.dim()
     }
 
     /// True distances in mm of the farthest and the nearest target.
     #[getter]
     fn range_mm(&self) -> (f64, f64) {
-        self.0.range_mm()
+        self.correction.range_mm()
+    }
+
+    /// Targets whose error stays unusually large after the correction, for example because of a wrong distance. Empty after `load`.
+    #[getter]
+    fn findings(&self) -> Vec<String> {
+        self.findings.clone()
     }
 
     fn __repr__(&self) -> String {
-        let ((height, width), (far_mm, near_mm)) = (self.0.dim(), self.0.range_mm());
-        format!("Correction({}, {height}x{width}, {far_mm} to {near_mm} mm)", self.0.method())
+        let ((height, width), (far_mm, near_mm)) = (self.correction.dim(), self.correction.range_mm());
+        format!("Correction({}, {height}x{width}, {far_mm} to {near_mm} mm)", self.correction.method())
     }
 }

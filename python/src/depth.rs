@@ -23,7 +23,7 @@ use crate::{
     arrays::{Image, check_alike, named, optics_named},
     depth_map::DepthMap,
     errors::{FarnearError, parsed, wrong},
-    optics::{Operators, Optics},
+    optics::Operators,
     work,
 };
 
@@ -168,12 +168,12 @@ pub fn depth(
         return Err(FarnearError::new_err(format!("min_confidence is {min_confidence}; expected 0 to 1")));
     }
     check_alike(("far", far.full_scale()), ("near", near.full_scale()))?;
-    let mut doubts: Vec<OpticsDoubt> = optics.0.doubts().into_iter().map(OpticsDoubt::Unusual).collect();
+    let mut doubts = optics.doubts();
     doubts.extend(another_size(&optics.0, far.view().dim()));
     let side = bin.side(&optics.0, &far, operators.is_some(), &mut doubts)?;
     let bins = side * optics.0.stage().map_or(1, |stage| stage.bin);
     let part = Part::of_bins(far.view().dim(), bins);
-    let averaged = (side > 1).then(|| Optics(optics.0.binned(side)));
+    let averaged = (side > 1).then(|| optics.binned(side));
     let optics = averaged.as_ref().unwrap_or(optics);
     let designed;
     let usual = if operators.is_some() { "ro" } else { "whitened" };

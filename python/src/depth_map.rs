@@ -230,7 +230,7 @@ impl DepthMap {
             deviation_mm: deviation.into_pyarray(py).unbind(),
             reasons: reasons.into_pyarray(py).unbind(),
             findings: record.warnings,
-            optics: Optics(record.optics),
+            optics: record.optics.into(),
             part: record.part.map(Place),
         })
     }

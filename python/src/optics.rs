@@ -7,6 +7,7 @@ use farnear_depth::{
     optics::{FocusSection, LensSection, OpticsFile, SensorSection},
     psf::Psf,
 };
+use farnear_workflows::optics::{OpticsDoubt, doubts};
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::prelude::*;
 
@@ -54,8 +55,35 @@ fn psf_of(text: &str) -> PyResult<Psf> {
 /// >>> farnear.Optics(focal_length_mm=50, aperture_mm=12.8, pixel_um=7.4, far_mm=933, max_blur_px=2.703)
 /// Optics(933.0000 to 886.8133 mm, blur up to 2.7030 px, pillbox)
 #[pyclass(frozen, eq, module = "farnear", from_py_object)]
-#[derive(Clone, PartialEq)]
-pub struct Optics(pub farnear_depth::optics::Optics);
+#[derive(Clone)]
+pub struct Optics(
+    pub farnear_depth::optics::Optics,
+    // Whether a point spread function was named.
+    bool,
+);
+
+impl Optics {
+    pub fn doubts(&self) -> Vec<OpticsDoubt> {
+        doubts(&self.0, self.1)
+    }
+
+    pub fn binned(&self, bin: usize) -> Self {
+        Self(self.0.binned(bin), self.1)
+    }
+}
+
+impl From<farnear_depth::optics::Optics> for Optics {
+    fn from(optics: farnear_depth::optics::Optics) -> Self {
+        Self(optics, true)
+    }
+}
+
+impl PartialEq for Optics {
+    // A pill-box that is assumed equals one that is named.
+    fn eq(&self, other: &Self) -> bool {
+        self.0 == other.0
+    }
+}
 
 #[pymethods]
 impl Optics {
@@ -83,14 +111,15 @@ impl Optics {
             stage: None,
             light: None,
         };
-        file.check().map(Self).map_err(wrong)
+        file.check().map(Self::from).map_err(wrong)
     }
 
-    /// Read optics from the text of an `optics.toml`.
+    /// Read optics from the text of an `optics.toml`. Without a `[psf]` a pill-box is assumed, which is a finding of `depth`.
     #[staticmethod]
     fn loads(text: &str) -> PyResult<Self> {
         let file: OpticsFile = toml::from_str(text).map_err(wrong)?;
-        file.check().map(Self).map_err(wrong)
+        let table: toml::Table = text.parse().map_err(wrong)?;
+        file.check().map(|optics| Self(optics, table.contains_key("psf"))).map_err(wrong)
     }
 
     /// Read an `optics.toml` file.
@@ -104,9 +133,14 @@ impl Optics {
         Ok((py.get_type::<Self>().getattr("loads")?, (self.dumps()?,)))
     }
 
-    /// Text of an `optics.toml` with these optics.
+    /// Text of an `optics.toml` with these optics, without `[psf]` if their file named none.
     fn dumps(&self) -> PyResult<String> {
-        toml::to_string(&self.0).map_err(wrong)
+        if self.1 {
+            return toml::to_string(&self.0).map_err(wrong);
+        }
+        let mut table = toml::Table::try_from(self.0).map_err(wrong)?;
+        table.remove("psf");
+        toml::to_string(&table).map_err(wrong)
     }
 
     /// Object distance in mm of a normalised depth (-1 at the far focus, +1 at the near focus).

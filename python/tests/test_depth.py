@@ -1,3 +1,4 @@
+import pickle
 import threading
 import time
 
@@ -167,6 +168,16 @@ def test_corrections_take_a_bowl_away(tmp_path):
         farnear.Correction.fit(targets[:2], method="clsf")
     with pytest.raises(farnear.FarnearError, match="60"):
         correction.apply(np.zeros((4, 4), np.float32))
+
+
+def test_a_target_unlike_the_others_is_a_finding():
+    random = np.random.default_rng(1)
+    targets = [(true + random.normal(0, 0.1, (60, 80)), true) for true in np.linspace(932, 888, 24)]
+    assert farnear.Correction.fit(targets, method="clsf").findings == []
+    targets[7] = (targets[7][0], targets[7][1] - 9)
+    found = farnear.Correction.fit(targets, method="clsf")
+    assert len(found.findings) == 1 and found.findings[0].startswith("patterns[7]: an error of"), found.findings
+    assert pickle.loads(pickle.dumps(found)).findings == found.findings
 
 
 def test_rendering_repeats(optics):

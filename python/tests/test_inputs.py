@@ -436,6 +436,14 @@ def test_optics_in_another_unit_are_a_finding(optics, slant):
     assert any("pixel_um is 0.0074 um" in finding and "another unit" in finding for finding in findings), findings
 
 
+def test_optics_whose_file_names_no_psf_are_a_finding(optics, slant):
+    unnamed = farnear.Optics.loads(optics.dumps().partition("[psf]")[0])
+    for found in (unnamed, farnear.Optics.loads(unnamed.dumps()), pickle.loads(pickle.dumps(unnamed))):
+        findings = farnear.depth(*slant[:2], found).findings
+        assert any("no [psf]: a pill-box is assumed" in finding for finding in findings), findings
+    assert unnamed == farnear.Optics.loads(unnamed.dumps() + '[psf]\nmodel = "pillbox"\n')
+
+
 def test_a_blur_that_is_too_large_is_a_finding(optics):
     wide = farnear.Optics(focal_length_mm=50, aperture_mm=12.8, pixel_um=7.4, far_mm=933, max_blur_px=5, psf=optics.psf)
     far, near, _ = farnear.render(wide, "slant", width=160, height=120)

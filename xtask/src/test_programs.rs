@@ -14,13 +14,14 @@ use anyhow::{Context, Result, bail};
 use serde_json::Value;
 
 use crate::{
-    host::PROGRAMS,
     limited, python,
     run::{ROOT, cargo, features, finish, output, target_folder},
 };
 
 /// Its tests read the whole repository.
 const SEES_EVERYTHING: &str = "xtask";
+/// Their tests run the programs or the firmware; others depend on their own files only.
+const RUN_PROGRAMS: [&str; 4] = ["farnear", "farnear-sim", "farnear-campaign", "farnear-capture"];
 /// Relative to the repository's root; see `tools/test-data`.
 const REAL_DATA: &str = "../shared/data";
 
@@ -147,8 +148,7 @@ pub fn environment<'a>(command: &'a mut Command, elf: &Path) -> &'a mut Command 
 fn dependencies(test: &Program, programs: &[PathBuf], elf: &Path) -> Result<String> {
     let mut hasher = DefaultHasher::new();
     hash_file(&test.executable, &mut hasher)?;
-    // Their tests run the programs or the firmware; others depend on their own files only.
-    if PROGRAMS.contains(&test.package.as_str()) {
+    if RUN_PROGRAMS.contains(&test.package.as_str()) {
         for program in programs.iter().map(PathBuf::as_path).chain([elf]) {
             hash_file(program, &mut hasher)?;
         }

@@ -4,9 +4,9 @@
 //! at column `x`, row `y` by a third-order polynomial fitted to flat targets (Li 2014, eq. 6.11). Forms:
 //! | form | terms | seams | table words | instructions per pixel (640-pixel rows; with the tables) |
 //! |---|---|---|---|---|
-//! | [`Regions`] | 10 in each of 3x3 regions | steps at region borders | `width` | 13.5 (13.7) |
+//! | [`Regions`] | 10 in each of 3x3 regions | steps at region borders | `width` | 13.8 |
 //! | [`Blend`] | the same, bilinear between region centres | none | `3 width` | 22.1 (23.6) |
-//! | [`Full`] | all 20 of third order, one set | none | `3 width` | 22.7 (22.7) |
+//! | [`Full`] | all 20 of third order, one set | none | `3 width` | 23.7 |
 //!
 //! (Emulated Cortex-M4F, `opt-level = "s"`, fat LTO.) [`RegionFit`] and [`FullFit`] fit the coefficients.
 //!

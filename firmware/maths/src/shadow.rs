@@ -8,8 +8,8 @@
 //!
 //! so `tan(eta) = my / mx = -Hc ry / (u rx - X0 ry)`. The silhouette is rotated by `beta = 3 pi / 4 - eta / 2` (8.20),
 //! between 90 and 180 deg, after mirroring if `mx < 0`. The standard deviation is first order ([`Shadow::deviation`]);
-//! the result reports where that fails, near the camera or the fold of the mirror. Cost: 950 instructions on a
-//! Cortex-M4F, sun included, and 1,160 for the deviation.
+//! the result reports where that fails, near the camera or the fold of the mirror. Cost: 880 instructions on a
+//! Cortex-M4F, sun included, and 990 for the deviation.
 
 mod deviation;
 

@@ -1,6 +1,6 @@
 //! Depth correction over the link by `farnear_maths::clsf`: rows in and out, fit of coefficients. One is open, one
 //! stored. RAM: 15 KiB for coefficients, a row, and a table or a fit's sums. Instructions: 9,000 to 15,000 per row of
-//! 640 pixels, up to 160,000 more for a region's first row, 730,000 for a solution. Rejected while a stepper moves.
+//! 640 pixels, up to 160,000 more for a region's first row, 742,000 for a solution. Rejected while a stepper moves.
 
 use farnear_maths::clsf::{
     Blend, Coefficient, Columns, Error, FULL_TERMS, Frame, Full, FullFit, REGION_TERMS, REGIONS,

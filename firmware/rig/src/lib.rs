@@ -31,9 +31,9 @@
 //! work ends with exactly one terminal event; causes of a stop are named, latched and survive a power loss. Not a goal:
 //! link speed.
 //!
-//! Cost in instructions, counted on the emulated board, of 33,600 per tick at 168 MHz: a tick 1,600 at rest, 2,900 with
-//! the piezo's loop closed, at most 7,100 with both steppers in their ramps; the last byte of a move request 9,900, the
-//! start 46,000. Mathematics may exceed a tick (a row of 640 pixels 15,000, a fit 731,000) and is rejected during
+//! Cost in instructions, counted on the emulated board, of 33,600 per tick at 168 MHz: a tick 1,400 at rest, 2,600 with
+//! the piezo's loop closed, 4,300 with both steppers at 40 kHz, too; the last byte of a move request 1,800, the
+//! start 32,000. Mathematics may exceed a tick (a row of 640 pixels 15,000, a fit 742,000) and is rejected during
 //! motion. RAM: 25 KiB, 12 of them scratch memory for depth correction. Stack: 10 KiB for a request, 19 KiB for the
 //! start. Ramps and shadow use single precision, only the fit double.
 #![no_std]

@@ -1,6 +1,6 @@
 //! The ramp on which a stretched piezo is lowered: a stack released suddenly swings into tension.
 
-/// Ticks while the supply sinks: 4.4 of the 4.8 ms that are left (docs/rig.md).
+/// Ticks while the supply sinks: 4.4 of the 4.95 ms that are left (docs/rig.md).
 pub const FAST: u32 = 22;
 
 /// The DAC's code after `at` of `over` ticks.

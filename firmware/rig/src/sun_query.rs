@@ -1,5 +1,5 @@
 //! Sun and shadow: the message's integers for `farnear_maths` and back. The host calls it too, to compare bit by bit
-//! (`docs/decisions/0009-sun-query.md`). Instructions: sun 550, its angles 250, shadow 400, its deviation 1,160.
+//! (`docs/decisions/0009-sun-query.md`). Instructions: sun with its angles 725, shadow 160, its deviation 990.
 
 use farnear_maths::angle::BinaryAngle;
 use farnear_maths::shadow::{Deviations, Error, Geometry, Reliability, Shadow};

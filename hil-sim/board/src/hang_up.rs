@@ -2,7 +2,7 @@
 #![allow(unsafe_code)] // two calls of signal; the block states why they are sound.
 
 /// Runs `listen`, which sets handlers of signals. A SIGHUP that was ignored before stays ignored.
-#[cfg(target_os = "linux")]
+#[cfg(unix)]
 pub(crate) fn keep_ignored<T>(listen: impl FnOnce() -> T) -> T {
     // SAFETY: an ignored signal runs no code of the program.
     let ignore = || unsafe { libc::signal(libc::SIGHUP, libc::SIG_IGN) };
@@ -14,7 +14,7 @@ pub(crate) fn keep_ignored<T>(listen: impl FnOnce() -> T) -> T {
     listening
 }
 
-#[cfg(not(target_os = "linux"))]
+#[cfg(not(unix))]
 pub(crate) fn keep_ignored<T>(listen: impl FnOnce() -> T) -> T {
     listen()
 }

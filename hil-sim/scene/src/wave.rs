@@ -141,20 +141,22 @@ impl WaveLens {
                 sum.re += *part as f32 * amplitude.norm_sqr() / total;
             }
         }
-        // The cell's and the pixel's own extent.
-        fourier.forward(&mut sum);
-        for (i, value) in sum.iter_mut().enumerate() {
-            let mean_over = |samples: usize, index: usize| -> f64 {
-                let phase = std::f64::consts::TAU * index as f64 / SIDE as f64;
-                // The middles of an even number of samples lie at halves.
-                (0..samples).map(|s| (phase * (s as f64 - 0.5 * (samples as f64 - 1.0))).cos()).sum::<f64>()
-                    / samples as f64
-            };
-            let [v, u] = [i / SIDE, i % SIDE].map(|index| {
+        // The cell's and the pixel's own extent along an axis, by the index of the frequency.
+        let mean_over = |samples: usize, index: usize| -> f64 {
+            let phase = std::f64::consts::TAU * index as f64 / SIDE as f64;
+            // The middles of an even number of samples lie at halves.
+            (0..samples).map(|s| (phase * (s as f64 - 0.5 * (samples as f64 - 1.0))).cos()).sum::<f64>()
+                / samples as f64
+        };
+        let extent: Vec<f64> = (0..SIDE)
+            .map(|index| {
                 let signed = if index > SIDE / 2 { SIDE - index } else { index };
                 mean_over(FINE_PER_PIXEL, signed) * mean_over(FINE_PER_PIXEL / CELLS_PER_PIXEL, signed)
-            });
-            *value *= (u * v) as f32;
+            })
+            .collect();
+        fourier.forward(&mut sum);
+        for (i, value) in sum.iter_mut().enumerate() {
+            *value *= (extent[i / SIDE] * extent[i % SIDE]) as f32;
         }
         fourier.inverse(&mut sum);
         let total: f32 = sum.iter().map(|value| value.re).sum();
@@ -175,6 +177,10 @@ impl WaveLens {
         let defocus = defocus_um / (8.0 * self.f_number * self.f_number * wavelength_um);
         let signed = |i: usize| if i >= SIDE / 2 { i as f64 - SIDE as f64 } else { i as f64 };
         let inside = |v: f64, u: f64| {
+            // Parts are less than a sample away.
+            if u.hypot(v) + 1.0 <= radius {
+                return 1.0;
+            }
             let parts = 0..PUPIL_PARTS * PUPIL_PARTS;
             let at = |i: usize| (i as f64 + 0.5) / PUPIL_PARTS as f64 - 0.5;
             let count =

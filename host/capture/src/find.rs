@@ -25,17 +25,19 @@ pub(crate) fn present() -> Vec<SerialPortInfo> {
 
 fn only(present: &[SerialPortInfo]) -> Result<String, PortError> {
     let names: Vec<String> = present.iter().map(|port| port.port_name.clone()).collect();
-    let mut boards: Vec<String> =
-        present.iter().filter(|port| is_board(port)).map(|port| port.port_name.clone()).collect();
-    // macOS lists each port twice; the `cu` one does not wait for a modem.
-    boards.retain(|name| {
-        !name.strip_prefix("/dev/tty.").is_some_and(|of| names.contains(&format!("/dev/cu.{of}")))
-    });
+    let boards = present.iter().filter(|port| is_board(port) && !is_call_in(port, present));
+    let mut boards: Vec<String> = boards.map(|port| port.port_name.clone()).collect();
     match boards.as_mut_slice() {
         [] => Err(PortError::NoBoard { present: names }),
         [one] => Ok(std::mem::take(one)),
         _ => Err(PortError::SeveralBoards { ports: boards }),
     }
+}
+
+/// macOS lists each port twice; the `cu` one does not wait for a modem.
+pub(crate) fn is_call_in(port: &SerialPortInfo, present: &[SerialPortInfo]) -> bool {
+    let name = port.port_name.strip_prefix("/dev/tty.");
+    name.is_some() && present.iter().any(|other| other.port_name.strip_prefix("/dev/cu.") == name)
 }
 
 fn is_board(port: &SerialPortInfo) -> bool {

@@ -116,7 +116,8 @@ impl Place {
     /// Present port of the board, by its adapter.
     fn find<'a>(&self, present: &'a [SerialPortInfo]) -> Option<&'a str> {
         let wanted = self.adapter.as_ref()?;
-        let mut found = present.iter().filter(|port| Adapter::of(port).as_ref() == Some(wanted));
+        let is_wanted = |port: &&SerialPortInfo| Adapter::of(port).as_ref() == Some(wanted);
+        let mut found = present.iter().filter(is_wanted).filter(|port| !find::is_call_in(port, present));
         let (first, another) = (found.next()?, found.next());
         let has_name = present.iter().any(|port| port.port_name == self.name);
         match (&wanted.serial, another) {
@@ -183,10 +184,16 @@ fn explain(path: &str, error: serialport::Error) -> PortError {
         ErrorKind::Io(io::ErrorKind::NotFound) => absent(path),
         ErrorKind::Io(io::ErrorKind::PermissionDenied) => PortError::Denied { port: path.into() },
         // The crate returns this kind for a busy and for a missing port.
-        ErrorKind::NoDevice if std::path::Path::new(path).exists() => PortError::Busy { port: path.into() },
+        ErrorKind::NoDevice if is_present(path, &find::present()) => PortError::Busy { port: path.into() },
         ErrorKind::NoDevice => absent(path),
         _ => PortError::Open { port: path.into(), reason: error.to_string() },
     }
+}
+
+/// Whether the port is a file, or listed: Windows does not show a port that another program holds as a file.
+fn is_present(path: &str, listed: &[SerialPortInfo]) -> bool {
+    let name = path.trim_start_matches(r"\\.\");
+    std::path::Path::new(path).exists() || listed.iter().any(|port| port.port_name.eq_ignore_ascii_case(name))
 }
 
 /// Sends by `write`, which gets the rest and the time left.
@@ -203,7 +210,7 @@ fn send_all(
             return Err(io::ErrorKind::TimedOut.into());
         }
         match write(rest, left) {
-            Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
+            // A serial port of Windows takes nothing within the time, without an error.
             Ok(count) => rest = &rest[count..],
             Err(error) if matches!(error.kind(), io::ErrorKind::Interrupted | io::ErrorKind::WouldBlock) => {}
             Err(error) => return Err(error),
@@ -230,7 +237,8 @@ impl Transport for SerialTransport {
     fn send(&mut self, bytes: &[u8], wait: Duration) -> io::Result<()> {
         send_all(bytes, wait, |rest, left| {
             let port = self.open_port()?;
-            port.set_timeout(left)?;
+            // Windows counts whole milliseconds, and without one a write has no end.
+            port.set_timeout(left.max(Duration::from_millis(1)))?;
             port.write(rest)
         })
     }
@@ -273,6 +281,24 @@ mod tests {
         assert!(error.contains("serial server"), "{error}");
         let error = with_rate("/dev/ttyACM0@115200").err().unwrap().to_string();
         assert!(error.contains("115200") && error.contains("2000000 or 921600"), "{error}");
+    }
+
+    #[test]
+    fn a_port_of_windows_that_another_program_holds_is_present() {
+        let port = |name: &str| SerialPortInfo { port_name: name.into(), port_type: SerialPortType::Unknown };
+        let listed = ["COM3", "COM10"].map(port);
+        let present = ["COM10", "com3", r"\\.\COM10", "COM1"].map(|name| is_present(name, &listed));
+        assert_eq!(present, [true, true, true, false]);
+    }
+
+    #[test]
+    fn a_line_that_takes_nothing_is_a_timeout() {
+        let stuck = |_: &[u8], left: Duration| {
+            std::thread::sleep(left);
+            Ok(0)
+        };
+        let error = send_all(&[1], Duration::from_millis(5), stuck).unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::TimedOut);
     }
 
     #[test]
@@ -331,6 +357,8 @@ mod tests {
         assert_eq!(find(&[numbered]), None, "another adapter");
         assert_eq!(find(&[same, other.clone()]), None, "its name is there");
         assert_eq!(find(&[other, port("/dev/ttyUSB3", None)]), None, "two of a make: a guess");
+        let [call_in, call_out] = ["/dev/tty.usb4", "/dev/cu.usb4"].map(|name| port(name, None));
+        assert_eq!(find(&[call_in, call_out]).as_deref(), Some("/dev/cu.usb4"), "one port of macOS");
     }
 
     #[cfg(unix)]

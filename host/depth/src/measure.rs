@@ -172,7 +172,9 @@ pub fn measure_pair(
     if settings.prepare.noise.is_none() && settings.prepare.limits.is_none() && camera.is_none() {
         scale_to_usual(&mut images);
     }
-    measure_after(&mut None, &Bank::whitened(optics)?, images, optics, method, camera, settings)
+    let white = Bank::whitened(optics)?;
+    // On a thread of the pool: another one would wake the pool for each parallel loop.
+    rayon::scope(|_| measure_after(&mut None, &white, images, optics, method, camera, settings))
 }
 
 /// Scales a pair whose squares are beyond f32, by a power of two, which rounds nothing.

@@ -263,7 +263,8 @@ pub fn prepare(
     camera: Option<&CameraFrames>,
     settings: &PrepareSettings,
 ) -> Result<Prepared, PrepareError> {
-    prepare_after(&mut None, images, optics, camera, settings)
+    // On a thread of the pool: another one would wake the pool for each parallel loop.
+    rayon::scope(|_| prepare_after(&mut None, images, optics, camera, settings))
 }
 
 /// [`prepare`] of the next pair of a rig. Reuses the registration of the `last` pair if it fits, else registers again.
@@ -480,12 +481,10 @@ fn merged(marks: [Option<Array2<u8>>; 2], warp: Option<&Warp>, near: &Array2<f32
         // An affine map sends one stretch of a row into the image.
         let from = (0..width).find(|x| source(*x).is_some()).unwrap_or(width);
         let to = (from..width).rev().find(|x| source(*x).is_some()).map_or(from, |last| last + 1);
-        for (x, reason) in row.iter_mut().enumerate().filter(|(_, reason)| **reason == 0) {
-            if !(from..to).contains(&x) {
-                *reason = Reason::Edge.code();
-            } else if let Some(marks) = &near_marks {
-                *reason = source(x).map_or(0, |at| marks[at]);
-            }
+        let or = |reason: &mut u8, other: u8| *reason = if *reason == 0 { other } else { *reason };
+        (0..from).chain(to..width).for_each(|x| or(&mut row[x], Reason::Edge.code()));
+        if let Some(marks) = &near_marks {
+            (from..to).for_each(|x| or(&mut row[x], source(x).map_or(0, |at| marks[at])));
         }
     });
     reasons

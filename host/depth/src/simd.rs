@@ -16,6 +16,7 @@ mod median;
 mod neon;
 mod peak;
 mod preparation;
+mod registration;
 mod rows;
 #[cfg(test)]
 mod same_everywhere;
@@ -28,6 +29,10 @@ pub(crate) use convolve::{MAX_ROWS, READ_BEYOND, Taps, convolve, convolve_rows};
 pub(crate) use median::median_row;
 pub(crate) use preparation::{
     add_energies, compare_row, halve_row, roll_row, sum, sum_of_squares, weigh_rows,
+};
+pub(crate) use registration::{
+    StepSums, between_rows, divide_by_polynomial, divide_by_root, find_taps, products, step_row,
+    weigh_six_rows,
 };
 pub(crate) use rows::{
     CubicRow, Extremes, SEVEN_BLOCK, WindowRow, confidence_row, extremes, normalise_row, vertical_sums,
@@ -86,7 +91,10 @@ pub enum Backend {
 impl Backend {
     /// The fastest available.
     pub fn best() -> Self {
-        Self::available()[0]
+        [Self::Avx512, Self::Avx2, Self::Neon]
+            .into_iter()
+            .find(|b| b.is_available())
+            .unwrap_or(Self::Portable)
     }
 
     /// All available, the fastest first.

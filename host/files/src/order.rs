@@ -89,7 +89,7 @@ pub(crate) fn file_name(path: &Path) -> String {
 }
 
 /// A text with its letters composed (NFC): names from macOS may have them in parts (NFD).
-pub(crate) fn composed(text: &str) -> String {
+pub fn composed(text: &str) -> String {
     text.nfc().collect()
 }
 

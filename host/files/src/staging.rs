@@ -1,5 +1,7 @@
 //! Atomic output: written to a temporary name, then renamed.
 
+mod held;
+
 use std::{
     collections::BTreeSet,
     ffi::{OsStr, OsString},
@@ -9,6 +11,8 @@ use std::{
     sync::{Mutex, MutexGuard, PoisonError},
     time::{Duration, Instant},
 };
+
+pub use held::{remove_file, rename};
 
 #[derive(Debug, thiserror::Error)]
 pub enum StagingError {
@@ -192,7 +196,7 @@ impl Staging {
             if self.target.is_dir() {
                 fs::remove_dir(&self.target).map_err(StagingError::at(&self.target))?;
             }
-            return fs::rename(&self.folder, &self.target).map_err(StagingError::at(&self.target));
+            return rename(&self.folder, &self.target).map_err(StagingError::at(&self.target));
         }
         let entries = fs::read_dir(&self.folder).and_then(Iterator::collect::<io::Result<Vec<_>>>);
         let mut names: Vec<OsString> = entries
@@ -205,7 +209,7 @@ impl Staging {
         let stale = |name: &&str| !names.iter().any(|new| new == OsStr::new(name));
         for name in self.record.iter().copied().chain(self.replaced.iter().copied().filter(stale)) {
             let place = self.target.join(name);
-            match fs::remove_file(&place) {
+            match remove_file(&place) {
                 Err(error) if error.kind() != io::ErrorKind::NotFound => {
                     return Err(StagingError::at(&place)(error));
                 }
@@ -214,7 +218,7 @@ impl Staging {
         }
         for name in names {
             let place = self.target.join(&name);
-            fs::rename(self.folder.join(&name), &place).map_err(StagingError::at(&place))?;
+            rename(&self.folder.join(&name), &place).map_err(StagingError::at(&place))?;
         }
         Ok(())
     }
@@ -237,7 +241,7 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), StagingError> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let partial = path.with_file_name(partial_name(&name));
     let _publishing = unpublished();
-    let written = fs::write(&partial, bytes).and_then(|()| fs::rename(&partial, path));
+    let written = fs::write(&partial, bytes).and_then(|()| rename(&partial, path));
     written.map_err(|source| {
         let _ = fs::remove_file(&partial);
         StagingError::Io { path: path.into(), source }

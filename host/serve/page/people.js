@@ -157,18 +157,24 @@ export function shadow() {
   const facts = h("div", { "aria-live": "polite" });
   const results = h("div", { "aria-live": "polite" });
   const sunlight = () => {
-    if (!time.value) throw new Error("Time: expected a date and a time, the field is empty");
+    if (!time.value) throw new Error(`Time: expected a date and a time, the field is ${time.validity.badInput ? "incomplete" : "empty"}`);
     return { lat: numeric(inputs.latitude), lon: numeric(inputs.longitude), time: new Date(time.value).toISOString() };
   };
+  let newest = 0;
   async function shown() {
-    if (!time.value) return;
+    const asked = ++newest;
     try {
-      const found = await call("POST", "/api/people/sun", sunlight());
+      const light = sunlight();
+      const found = await call("POST", "/api/people/sun", light);
+      // An answer that is overtaken by a later question is old.
+      if (asked !== newest) return;
       const { elevation_deg, azimuth_deg } = found.figures;
       picture.replaceChildren(draw.sun(elevation_deg, found.direction_deg, found.length_per_height ?? NaN));
-      facts.replaceChildren(rows([["time in UTC", sunlight().time.slice(0, 16).replace("T", " ")], ["sun above the horizon", `${number(elevation_deg, 2)}°`], ["sun from north", `${number(azimuth_deg, 2)}°`],
+      facts.replaceChildren(rows([["time in UTC", light.time.slice(0, 16).replace("T", " ")], ["sun above the horizon", `${number(elevation_deg, 2)}°`], ["sun from north", `${number(azimuth_deg, 2)}°`],
         ["shadow falls to", `${number(found.direction_deg, 1)}°`], ["shadow's length", found.length_per_height == null ? "no shadow" : `${number(found.length_per_height, 2)} × height`]]));
     } catch (error) {
+      if (asked !== newest) return;
+      picture.replaceChildren();
       facts.replaceChildren(h("p", { class: "bad" }, error.message));
     }
   }

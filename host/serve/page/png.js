@@ -1,24 +1,27 @@
-// PNG as numbers. A browser that protects against fingerprinting changes the values of a canvas, so grey images are decoded here.
+// PNG as numbers. A canvas changes the values of colours by their profile and alpha, and all values in a browser that protects against
+// fingerprinting, so usual images are decoded here.
 import { h } from "./ui.js";
 
 const [IHDR, IDAT] = [0x49484452, 0x49444154];
+/** Channels by the type of colour: grey, red-green-blue, each also with alpha. @type {Record<number, number>} */
+const CHANNELS = { 0: 1, 2: 3, 4: 2, 6: 4 };
 
-/** Width, height and data of an image, 0 to 255. @param {ArrayBuffer} buffer @returns {Promise<import("./maps.js").NumberMap>} */
+/** Width, height and data of the grey or the red of an image, 0 to 255. @param {ArrayBuffer} buffer @returns {Promise<import("./maps.js").NumberMap>} */
 export async function parse(buffer) {
   const view = new DataView(buffer);
   const parts = [];
-  let [width, height, bits, grey] = [0, 0, 0, false];
+  let [width, height, bits, channels] = [0, 0, 0, 0];
   for (let at = 8; at + 12 <= buffer.byteLength; at += 12 + view.getUint32(at)) {
     const [length, name] = [view.getUint32(at), view.getUint32(at + 4)];
     if (name === IHDR) {
       [width, height, bits] = [view.getUint32(at + 8), view.getUint32(at + 12), view.getUint8(at + 16)];
-      grey = bits >= 8 && view.getUint8(at + 17) === 0 && view.getUint8(at + 20) === 0;
+      if (bits >= 8 && view.getUint8(at + 20) === 0) channels = CHANNELS[view.getUint8(at + 17)] ?? 0;
     } else if (name === IDAT) parts.push(buffer.slice(at + 8, at + 8 + length));
   }
-  if (!grey) return painted(buffer);
+  if (!channels) return painted(buffer);
   const lines = new Blob(parts).stream().pipeThrough(new DecompressionStream("deflate"));
   const raw = new Uint8Array(await new Response(lines).arrayBuffer());
-  const step = bits / 8;
+  const step = (channels * bits) / 8;
   const data = new Float32Array(width * height);
   for (let row = 0; row < height; row++) {
     const begin = row * (width * step + 1) + 1;
@@ -47,7 +50,7 @@ function nearest(left, above, corner) {
   return byLeft <= byAbove && byLeft <= byCorner ? left : byAbove <= byCorner ? above : corner;
 }
 
-/** The red of an image that is not grey. @param {ArrayBuffer} buffer */
+/** The red of an image with a palette, few bits or interlacing. @param {ArrayBuffer} buffer */
 async function painted(buffer) {
   const picture = await createImageBitmap(new Blob([buffer]));
   const { width, height } = picture;

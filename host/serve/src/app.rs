@@ -81,6 +81,8 @@ pub struct App {
 #[derive(Clone, Debug)]
 pub struct Live {
     pub mode: LiveMode,
+    /// An error ended it, so it begins again with the rig.
+    pub failed: bool,
     pub exposure: Micros,
     /// Of exposures that the board triggers.
     pub light: Option<LightLevels>,
@@ -109,6 +111,7 @@ impl App {
         let of_optics = GivenOptics::read(&own)?.light;
         let live = Live {
             mode: LiveMode::Image,
+            failed: false,
             exposure: camera.exposure,
             light: camera.light.or(of_optics),
             measure: FocusMeasure::ModifiedLaplacian,
@@ -206,6 +209,7 @@ impl App {
     /// Changes the live settings and ends the present live view.
     pub fn set_live(&self, change: impl FnOnce(&mut Live)) {
         let mut live = lock(&self.live);
+        live.failed = false;
         change(&mut live);
         live.cancel.cancel();
         live.cancel = Cancel::default();
@@ -308,10 +312,15 @@ impl App {
         self.change(|state| state.live.recording_ended = Some(ended));
     }
 
-    /// As [`Self::begin_stop`], for a reason that the stopped job reports.
+    /// As [`Self::begin_stop`], for a reason that the stopped job or live depth reports.
     pub fn begin_stop_because(&self, reason: &str) -> Stop {
         *lock(&self.stop_reason) = Some(reason.into());
-        self.begin_stop()
+        let was_depth = self.live().mode == LiveMode::Depth;
+        let stop = self.begin_stop();
+        if was_depth {
+            self.change(|state| state.live.error = Some(reason.into()));
+        }
+        stop
     }
 
     pub fn take_stop_reason(&self) -> Option<String> {

@@ -68,7 +68,9 @@ impl Token {
     pub fn read(path: &Path) -> Result<Self, TokenError> {
         let text =
             fs::read_to_string(path).map_err(|source| TokenError::Read { path: path.into(), source })?;
-        Self::new(text.trim()).ok_or_else(|| TokenError::Content { path: path.into() })
+        // PowerShell writes a byte-order mark.
+        let text = text.trim_start_matches('\u{feff}').trim();
+        Self::new(text).ok_or_else(|| TokenError::Content { path: path.into() })
     }
 
     /// Accepts letters and digits; `None` for other or short texts.
@@ -321,6 +323,13 @@ mod tests {
             assert!(Token::new(text).is_none(), "{text:?}");
         }
         assert_eq!(format!("{:?}", network().token), "Some(Token(...))");
+    }
+
+    #[test]
+    fn a_token_file_of_windows_is_read() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        fs::write(file.path(), format!("\u{feff}{SECRET}\r\n")).unwrap();
+        assert!(Token::read(file.path()).unwrap().is(SECRET));
     }
 
     #[test]

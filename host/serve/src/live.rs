@@ -66,7 +66,7 @@ pub fn look(app: &App) {
 /// Switches the live view off because of an error.
 pub fn fail(app: &App, error: &str) {
     app.note(format!("live: {error}"));
-    app.set_live(|live| live.mode = LiveMode::Off);
+    app.set_live(|live| (live.mode, live.failed) = (LiveMode::Off, true));
     app.change(|state| state.live.error = Some(error.into()));
     // After the mode has changed: no recording begins any more.
     app.finish_recording();
@@ -132,7 +132,9 @@ fn look_at_depth(app: &App, rig: RigAddress, context: &Context<'_>, rate: &Rate)
     let ends = ends(&optics::read(&app.optics_file())?);
     let settings = LiveDepthSettings { rig, camera: app.camera(), optics: app.optics_file() };
     live_depth::watch(&settings, context, |depth: LiveDepth<'_>| {
-        if app.state().live.error.is_some() {
+        let shown = app.state().live;
+        // The error of a view that was stopped is the reason of the stop.
+        if shown.mode == LiveMode::Depth && shown.error.is_some() {
             app.change(|state| state.live.error = None);
         }
         record(app, &depth);
@@ -214,6 +216,22 @@ pub(crate) mod tests {
         assert_eq!((app.state().live.light_percent, light()), ([30.0, 0.0], Some([30.0, 0.0])));
         app.set_live(|live| live.light = Some(LightLevels::OFF));
         assert_eq!((app.state().live.light_percent, light()), ([0.0; 2], None));
+    }
+
+    #[test]
+    fn live_depth_that_was_stopped_for_a_reason_shows_it() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let app = app(folder.path());
+        for (mode, left, error) in [
+            (LiveMode::Depth, LiveMode::Off, Some("the browser has disconnected")),
+            (LiveMode::Image, LiveMode::Image, None),
+        ] {
+            app.set_live(|live| live.mode = mode);
+            drop(app.begin_stop_because("the browser has disconnected"));
+            let live = app.state().live;
+            assert_eq!((live.mode, live.error.as_deref()), (left, error));
+            assert!(!app.live().failed, "the rig's next answer does not start it again");
+        }
     }
 
     #[test]

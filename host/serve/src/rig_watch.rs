@@ -78,7 +78,7 @@ fn connect(app: &App) {
 
 /// Restarts the live image if an error had ended it.
 fn resume_live(app: &App) {
-    if app.state().live.error.is_some() {
+    if app.live().failed {
         app.set_live(|live| live.mode = LiveMode::Image);
     }
 }

@@ -13,6 +13,9 @@ oneServer(async () => {
   await page.context().close();
 });
 
+/** PNG of 2x2 px whose red is 1, 200, 11, 201 and whose alpha is 0, 7, 10, 255. */
+const COLOURS = "iVBORw0KGgoAAAANSUhEUgAAAAIAAAACCAYAAABytg0kAAAAGklEQVR4nGNkZGJmOC4kzc7ExcXFxcjI+AMADvsCKKBGbBMAAAAASUVORK5CYII=";
+
 /** The page with the depth of the first pair. */
 async function depth(options) {
   const page = await open(browser, `${server.address}#depth/pair-001`, options);
@@ -331,8 +334,21 @@ test("dates have one form in every language, and the sun's time is also shown in
   await page.locator(".capture-words p", { hasText: /\d{4}-\d\d-\d\d \d\d:\d\d:\d\d$/ }).first().waitFor();
   await page.locator("#tab-guides").click();
   await page.locator("button[data-guide=shadow]").click();
-  await page.locator("#view-guides").getByLabel("Time", { exact: true }).fill("2026-06-21T12:00");
+  const time = page.locator("#view-guides").getByLabel("Time", { exact: true });
+  await time.fill("2026-06-21T12:00");
   await page.locator("#view-guides dd", { hasText: "2026-06-21 03:00" }).waitFor();
+  await time.fill("");
+  await page.locator("#view-guides .bad", { hasText: "Time: expected a date and a time" }).waitFor();
+  assert.equal(await page.locator("#view-guides dd", { hasText: "2026-06-21" }).count(), 0, "figures of the time before");
+});
+
+test("a colour image has the values of its file, also where it is transparent", async () => {
+  const page = await open(browser, server.address);
+  const values = await page.evaluate(async (text) => {
+    const { parse } = await import("/png.js");
+    return [...(await parse(Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer)).data];
+  }, COLOURS);
+  assert.deepEqual(values, [1, 200, 11, 201]);
 });
 
 test("the page starts in a browser that keeps nothing for it and has no known language", async () => {

@@ -6,7 +6,7 @@ use std::{
     path::{Component, Path, PathBuf},
 };
 
-use farnear_files::image_file::file_and_page;
+use farnear_files::{image_file::file_and_page, video::pictures::left_by_system};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -37,7 +37,8 @@ pub(crate) fn hashed(inputs: &[PathBuf], out: &Path) -> Result<Vec<HashedFile>> 
     files.par_iter().map(|file| hash(file, &relative(file, &place))).collect()
 }
 
-/// All files of the inputs, each once. Below a folder, results with their records and unfinished files are left out.
+/// All files of the inputs, each once. Below a folder, results with their records, unfinished files and those of the system are
+/// left out.
 pub(crate) fn files(inputs: &[PathBuf], is_result: &dyn Fn(&Path) -> bool) -> Result<Vec<PathBuf>> {
     let mut files: Vec<PathBuf> = Vec::new();
     for input in inputs {
@@ -58,7 +59,7 @@ fn inputs_below(folder: &Path, is_result: &dyn Fn(&Path) -> bool) -> Result<Vec<
     let is_record = |path: &Path| batch::result_of(path).is_some_and(|result| is_result(&result));
     let mut followed = vec![real(folder)];
     let mut skips = |path: &Path| {
-        if batch::is_unfinished(path) || is_result(path) || is_record(path) {
+        if batch::is_unfinished(path) || left_by_system(path) || is_result(path) || is_record(path) {
             return true;
         }
         if !path.is_symlink() || !path.is_dir() {
@@ -167,6 +168,17 @@ mod tests {
         assert_eq!(names, ["../b.tif", "../camera/dark.npy"]);
         // Output of sha256sum.
         assert_eq!(found[0].sha256, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+    }
+
+    #[test]
+    fn files_that_a_file_manager_leaves_are_not_inputs() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for name in ["1.png", ".DS_Store", "._1.png", "THUMBS.DB", "Desktop.ini", ".hidden.png"] {
+            fs::write(folder.path().join(name), "abc").expect("a writable folder");
+        }
+        let found = hashed(&[folder.path().into()], &folder.path().join("out")).expect("readable");
+        let names: Vec<_> = found.iter().map(|file| file.file.as_str()).collect();
+        assert_eq!(names, ["../.hidden.png", "../1.png"], "looking at a folder does not change its records");
     }
 
     #[cfg(unix)]

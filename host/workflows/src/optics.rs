@@ -153,7 +153,8 @@ impl fmt::Display for OpticsDoubt {
     }
 }
 
-fn doubts(optics: &Optics, psf_is_given: bool) -> Vec<OpticsDoubt> {
+/// Of the values of the optics, and of a point spread function that their file does not name.
+pub fn doubts(optics: &Optics, psf_is_given: bool) -> Vec<OpticsDoubt> {
     let unusual = optics.doubts().into_iter().map(OpticsDoubt::Unusual);
     unusual.chain((!psf_is_given).then_some(OpticsDoubt::NoPsf)).collect()
 }

@@ -6,7 +6,7 @@ use std::{
 };
 
 use farnear_capture::record::{CAPTURE_FILE, CaptureRecord, read_record};
-use farnear_files::staging::write_file;
+use farnear_files::staging::{self, write_file};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -19,18 +19,8 @@ const NOTE_MAX: usize = 64 * 1024;
 /// Prefix of folders with another map of a capture.
 const VARIANT: &str = "variant-";
 /// Other names in a session's folder.
-const RESERVED: &[&str] = &[
-    "people",
-    "recordings",
-    "flat-series",
-    "optics.toml",
-    "quality.toml",
-    "correction.toml",
-    "con",
-    "nul",
-    "aux",
-    "prn",
-];
+const RESERVED: &[&str] =
+    &["people", "recordings", "flat-series", "optics.toml", "quality.toml", "correction.toml"];
 const BEST: u8 = 5;
 
 #[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
@@ -78,6 +68,14 @@ fn is_plain(name: &str) -> bool {
     one && !name.starts_with('.') && !name.chars().any(char::is_control)
 }
 
+/// Whether Windows takes the name for a device, with any ending: `NUL`, `com1.mp4`.
+fn is_device(name: &str) -> bool {
+    let stem = name.split('.').next().unwrap_or_default().trim_end().to_ascii_lowercase();
+    let number = stem.strip_prefix("com").or_else(|| stem.strip_prefix("lpt"));
+    ["con", "prn", "aux", "nul"].contains(&stem.as_str())
+        || number.is_some_and(|number| matches!(number.as_bytes(), [b'0'..=b'9']))
+}
+
 /// Entry of a session by a name that all systems allow.
 pub fn folder_of(session: &Path, name: &str) -> Result<PathBuf> {
     entry_of(session, name, "capture")
@@ -85,11 +83,11 @@ pub fn folder_of(session: &Path, name: &str) -> Result<PathBuf> {
 
 /// As [`folder_of`], for something that is not a capture; `kind` names it in errors.
 pub fn entry_of(session: &Path, name: &str, kind: &'static str) -> Result<PathBuf> {
-    let everywhere =
-        !name.chars().any(|c| "/\\:*?\"<>|".contains(c)) && name.trim() == name && name.len() <= 100;
-    if !is_plain(name) || !everywhere {
-        let expected = "expected a name of at most 100 bytes that does not begin with a dot or a blank, without control characters \
-                        and / \\ : * ? \" < > |";
+    let letters = !name.chars().any(|c| "/\\:*?\"<>|".contains(c));
+    let everywhere = letters && name.trim() == name && !name.ends_with('.') && !is_device(name);
+    if !is_plain(name) || !everywhere || name.len() > 100 {
+        let expected = "expected a name of at most 100 bytes that does not begin or end with a dot or a blank, without control \
+                        characters and / \\ : * ? \" < > |, and not that of a device of Windows (CON, NUL, COM1)";
         return Err(WorkflowError::parameter(kind, name, expected));
     }
     Ok(session.join(name))
@@ -255,7 +253,7 @@ pub fn delete(session: &Path, name: &str) -> Result<()> {
 
 pub fn rename(session: &Path, name: &str, to: &str) -> Result<()> {
     let (folder, target) = (existing(session, name)?, new_capture(session, to)?);
-    fs::rename(&folder, &target).map_err(|source| WorkflowError::Folder { folder, source })
+    staging::rename(&folder, &target).map_err(|source| WorkflowError::Folder { folder, source })
 }
 
 fn broken(name: &str, error: &WorkflowError) -> Capture {
@@ -369,8 +367,11 @@ mod tests {
 
     #[test]
     fn names_that_lead_elsewhere_are_refused() {
-        for name in ["..", "../x", "a/b", "/etc", "", ".hidden", "a\\b", "x\0"] {
+        for name in ["..", "../x", "a/b", "/etc", "", ".hidden", "a\\b", "x\0", "x.", "Nul.mp4", "lpt9"] {
             assert!(folder_of(Path::new("s"), name).is_err(), "{name:?}");
+        }
+        for name in ["console", "com", "com10", "lpta", "auxiliary.y4m", "x.nul"] {
+            assert!(folder_of(Path::new("s"), name).is_ok(), "{name:?}");
         }
         let error = entry_of(Path::new("s"), "../x", "video").unwrap_err().to_string();
         assert!(error.starts_with("video ../x: expected a name"), "{error}");

@@ -145,6 +145,8 @@ impl Simulator {
         // In its own process group, so that Ctrl-C first stops all motion and then the simulator.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        #[cfg(windows)] // CREATE_NEW_PROCESS_GROUP
+        std::os::windows::process::CommandExt::creation_flags(&mut command, 0x200);
         let mut child = command
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())

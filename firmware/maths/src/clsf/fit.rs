@@ -3,8 +3,8 @@
 //! Normal equations are integer sums: a term (a product of powers of x, y and U) is rounded to 20 fraction bits, a
 //! product has 40, and 2^22 of them fit an `i64`. The order of rows has no effect. Only the final Cholesky solution
 //! uses double precision, in software on the board. A subsample suffices: every eighth pixel of every eighth row of 24
-//! targets at 640x480 is 115,200 samples. Cost on a Cortex-M4F: 620 instructions a sample for ten terms, 1,900 for
-//! twenty; 730,000 (all regions) and 460,000 to solve. Memory: 8 KiB for all regions, 3.4 KiB for the full form.
+//! targets at 640x480 is 115,200 samples. Cost on a Cortex-M4F: 780 instructions a sample for ten terms, 2,090 for
+//! twenty; 742,000 (all regions) and 477,000 to solve. Memory: 8 KiB for all regions, 3.4 KiB for the full form.
 
 use nalgebra::{SMatrix, SVector};
 

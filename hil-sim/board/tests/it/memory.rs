@@ -167,7 +167,7 @@ fn power_loss_during_a_write_leaves_the_old_or_the_new_value() {
 
 #[test]
 fn power_loss_during_motion_invalidates_the_position() {
-    let mut bench = Bench::new(1);
+    let mut bench = Bench::near_home(1);
     for axis in [Axis::SensorCoarse, Axis::Lens] {
         bench.home();
         assert_eq!(bench.ask(&go(axis, 5_000_000)), Ok(Response::Accepted));

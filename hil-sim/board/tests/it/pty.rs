@@ -6,6 +6,7 @@ use std::{
     net::TcpStream,
     path::Path,
     process::{Child, Command, Stdio},
+    sync::LazyLock,
     time::{Duration, Instant},
 };
 
@@ -18,6 +19,16 @@ use farnear_protocol::{
 };
 /// Turns a hang into a failure.
 const PATIENCE: Duration = Duration::from_secs(60);
+pub const NEAR_HOME: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/it/near-home.toml");
+const USUAL: [&str; 8] = ["--scene", "staircase", "--noise", "8bit", "--seed", "3", "--scenario", NEAR_HOME];
+
+/// Both frames of a rig with the options [`USUAL`].
+static CAPTURED: LazyLock<Vec<(FrameHeader, Vec<u8>)>> = LazyLock::new(|| {
+    let program = Program::start(&USUAL);
+    let frames = capture(&program);
+    assert!(program.end().success());
+    frames
+});
 
 pub struct Program {
     child: Child,
@@ -210,22 +221,19 @@ fn nohup_lets_it_outlive_its_terminal() {
 
 #[test]
 fn a_capture_through_pty_and_camera_repeats_to_the_byte() {
-    let arguments = ["--scene", "staircase", "--noise", "8bit", "--seed", "3"];
-    let program = Program::start(&arguments);
-    let first = capture(&program);
-    assert!(program.end().success());
+    let first = &*CAPTURED;
     assert_eq!((first[0].0.width, first[0].0.height, first[0].0.bits), (640, 480, 8));
     assert_eq!([first[0].0.shot_id, first[1].0.shot_id], [0, 1]);
     assert_ne!(first[0].1, first[1].1, "far and near look alike");
-    let program = Program::start(&arguments);
+    let program = Program::start(&USUAL);
     let second = capture(&program);
     assert!(program.end().success());
-    assert!(first == second, "two programs with one seed differ");
-    let program = Program::start(&[&arguments[..], &["--tcp"]].concat());
+    assert!(*first == second, "two programs with one seed differ");
+    let program = Program::start(&[&USUAL[..], &["--tcp"]].concat());
     assert!(program.port.starts_with("tcp:127.0.0.1:"), "{}", program.port);
     let third = capture(&program);
     assert!(program.end().success());
-    assert!(first == third, "the kind of port changes the run");
+    assert!(*first == third, "the kind of port changes the run");
 }
 
 #[test]
@@ -249,7 +257,7 @@ fn a_tcp_port_serves_one_client_after_the_other() {
 
 #[test]
 fn a_half_mirror_gives_a_picture_of_both_cameras_per_trigger() {
-    let program = Program::start(&["--noise", "8bit", "--seed", "3", "--half-mirror"]);
+    let program = Program::start(&[&USUAL[..], &["--half-mirror"]].concat());
     let first = capture(&program);
     let second = frames_at(program.second_camera.as_ref().expect("a second address"));
     assert!(program.end().success());
@@ -265,9 +273,7 @@ fn a_half_mirror_gives_a_picture_of_both_cameras_per_trigger() {
     }
     // The first exposure at the further sensor resembles a single camera's near image more than its own far
     // image.
-    let program = Program::start(&["--noise", "8bit", "--seed", "3"]);
-    let single = capture(&program);
-    assert!(program.end().success());
+    let single = &*CAPTURED;
     let unlike = |pixels: &[u8]| {
         let bright = second[0].1.chunks(2).map(|code| 2.0 * f64::from(code[0]));
         bright.zip(pixels.chunks(2)).map(|(a, b)| (a - f64::from(b[0])).powi(2)).sum::<f64>()

@@ -1,6 +1,6 @@
 //! Equal seeds give equal bytes; different seeds do not.
 
-use crate::bench::{Bench, fine_shot};
+use crate::bench::{Bench, fine_shot, start_near_home};
 use farnear_protocol::{Nanometres, message::Axis};
 use farnear_scene::{Camera, Lens, Noise, OpticsFile, Scene, standard};
 use farnear_sim::{config::RigConfig, imager::Imager};
@@ -8,7 +8,8 @@ use farnear_sim::{config::RigConfig, imager::Imager};
 fn session(seed: u64) -> (String, String, Vec<Vec<u8>>) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let trace = folder.path().join("trace.csv");
-    let config = RigConfig { seed, trace: Some(trace.clone()), ..RigConfig::default() };
+    let scenario = start_near_home();
+    let config = RigConfig { seed, trace: Some(trace.clone()), scenario, ..RigConfig::default() };
     let mut bench = Bench::with(&config);
     bench.home();
     bench.move_to(Axis::SensorCoarse, Nanometres(5_821_300));

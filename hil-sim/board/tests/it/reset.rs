@@ -36,7 +36,7 @@ fn a_reboot_counts_up_and_refuses_its_repeat() {
 
 #[test]
 fn distinguishes_the_reset_button_from_a_request() {
-    let mut bench = Bench::new(1);
+    let mut bench = Bench::near_home(1);
     bench.home_axis(Axis::SensorCoarse);
     // The motor is at rest and the position stored.
     bench.rig.advance_us(200_000).expect("runs");

@@ -36,7 +36,7 @@ fn homing_finds_the_edge_and_moves_reach_their_target() {
 
 #[test]
 fn a_stall_is_detected_and_invalidates_the_position() {
-    let mut bench = Bench::new(3);
+    let mut bench = Bench::near_home(3);
     bench.home();
     bench.access(|rig| rig.plant(|plant| plant.stage_mut(StageName::Sensor).set_stalled(true)));
     let end = bench.move_to(Axis::SensorCoarse, Nanometres(2_000_000));

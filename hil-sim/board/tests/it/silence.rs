@@ -21,7 +21,7 @@ fn move_off(bench: &mut Bench, silence: Micros) -> u32 {
 
 #[test]
 fn a_silent_host_stops_the_move_within_its_deadline() {
-    let mut bench = Bench::new(1);
+    let mut bench = Bench::near_home(1);
     let begin_ns = bench.report().now_ns;
     let request = move_off(&mut bench, DEADLINE);
     let begin_ns = begin_ns.max(bench.report().now_ns - 1_000 * ANSWER_US);
@@ -42,7 +42,7 @@ fn a_silent_host_stops_the_move_within_its_deadline() {
 
 #[test]
 fn any_frame_keeps_the_move_alive() {
-    let mut bench = Bench::new(1);
+    let mut bench = Bench::near_home(1);
     move_off(&mut bench, DEADLINE);
     for _ in 0..8 {
         bench.rig.advance_us(300_000).expect("runs");

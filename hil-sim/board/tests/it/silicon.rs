@@ -334,7 +334,7 @@ fn works(bench: &mut Bench) {
 
 #[test]
 fn without_the_outer_clock_the_board_runs_on_its_internal_one_and_reports_it() {
-    let mut bench = Bench::new(1);
+    let mut bench = Bench::near_home(1);
     bench.access(|rig| {
         rig.set_outer_clock(false);
         rig.press_reset();
@@ -358,7 +358,7 @@ fn without_the_outer_clock_the_board_runs_on_its_internal_one_and_reports_it() {
 
 #[test]
 fn a_clock_failure_during_a_move_stops_the_motors_and_is_reported() {
-    let mut bench = Bench::new(1);
+    let mut bench = Bench::near_home(1);
     bench.home_axis(Axis::Lens);
     bench.send(&go(Axis::Lens, 2_000_000));
     bench.rig.advance_us(200_000).expect("runs");
@@ -381,7 +381,7 @@ fn a_clock_failure_during_a_move_stops_the_motors_and_is_reported() {
 
 #[test]
 fn a_short_clock_failure_is_reported() {
-    let mut bench = Bench::new(1);
+    let mut bench = Bench::near_home(1);
     bench.access(|rig| rig.set_outer_clock(false));
     bench.rig.advance_us(100).expect("runs");
     bench.access(|rig| rig.set_outer_clock(true));

@@ -17,7 +17,7 @@ const PERIOD_NS: u64 = 25_000;
 const RESTART_NS: u64 = 1_500;
 
 fn random_moves(seed: u64, moves: u32) {
-    let mut bench = Bench::new(seed);
+    let mut bench = Bench::near_home(seed);
     bench.home();
     let mut noise = Noise::new(seed, "test of step counts");
     let mut at = 2000.0;
@@ -87,7 +87,7 @@ fn travels(bench: &mut Bench, edges_wanted: u64) -> u64 {
 
 #[test]
 fn both_axes_at_40_khz_give_every_step_on_time() {
-    let mut bench = Bench::new(1);
+    let mut bench = Bench::near_home(1);
     let edges = amount("FARNEAR_STEPS", 300_000);
     let worst_ns = travels(&mut bench, edges);
     println!("{edges} steps on two axes: at full speed {PERIOD_NS} to {worst_ns} ns apart");
@@ -110,7 +110,7 @@ fn stops(
     release: impl Fn(&mut Bench),
     expected: fn(&Alarm) -> bool,
 ) -> u64 {
-    let mut bench = Bench::new(1);
+    let mut bench = Bench::near_home(1);
     let mut worst_us = 0;
     for turn in 0..8 {
         bench.home();
@@ -192,7 +192,7 @@ fn a_driver_fault_ends_the_steps_within_a_millisecond() {
 
 #[test]
 fn a_stop_in_mid_move_brakes_along_the_ramp_and_loses_nothing() {
-    let mut bench = Bench::new(1);
+    let mut bench = Bench::near_home(1);
     bench.home();
     let mut worst_us = 0;
     for turn in 0..8 {

@@ -55,7 +55,7 @@ fn a_sinking_supply_leaves_time_to_store_its_alarm() {
     for rest_us in [0, 100_000, 100_700, 101_900] {
         let mut bench = Bench::new(1);
         bench.rig.advance_us(rest_us).expect("runs");
-        // Below the detector's level; 2,200 uF at 0.2 A give 4.8 ms from 2.95 V to the brown-out reset at 2.5 V.
+        // Below the detector's level; 2,200 uF at 0.2 A give 4.95 ms from 2.95 V to the brown-out reset at 2.5 V.
         bench.access(|rig| rig.set_supply_mv(2_950));
         bench.rig.advance_us(4_800).expect("runs");
         bench.access(|rig| rig.brown_out());
@@ -83,7 +83,7 @@ fn unplugging_the_board_with_the_amplifier_on_does_not_snap_the_stack() {
         bench.rig.advance_us(100_000).expect("runs");
         let pulled = bench.report().piezo_pulled_um;
         println!("{rest_us} us after the move, {left_us} us left: pulled by {pulled:.1} um");
-        // Without the 4.8 ms nothing softens it. Blocking force: 200 um.
+        // Without these 4.8 ms nothing softens it. Blocking force: 200 um.
         assert!(allowed.contains(&pulled), "{pulled} um");
     }
 }
@@ -132,7 +132,7 @@ fn floating_selects_at_a_reset_move_the_piezo_and_resistors_prevent_it() {
 #[test]
 fn bouncing_break_contacts_cut_the_steps_once_and_none_follows() {
     for seed in 1..=8 {
-        let mut bench = Bench::new(seed);
+        let mut bench = Bench::near_home(seed);
         bench.home_axis(Axis::Lens);
         bench.send(&go(Axis::Lens, 2_000_000));
         bench.rig.advance_us(250_000).expect("runs");

@@ -159,6 +159,8 @@ impl CommandCamera {
         // Own process group: grandchildren end with it, and Ctrl-C goes to this program only.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        #[cfg(windows)] // CREATE_NEW_PROCESS_GROUP
+        std::os::windows::process::CommandExt::creation_flags(&mut command, 0x200);
         let mut child = command.spawn().map_err(|error| match error.kind() {
             std::io::ErrorKind::NotFound => {
                 unusable("no such program; check its path and installation".into())

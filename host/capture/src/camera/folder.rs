@@ -73,7 +73,7 @@ impl FolderCamera {
             let path = entry.map_err(failed)?.path();
             let ending =
                 path.extension().and_then(|ending| ending.to_str()).unwrap_or("").to_ascii_lowercase();
-            if !pictures::EXTENSIONS.contains(&ending.as_str()) {
+            if pictures::hidden(&path) || !pictures::EXTENSIONS.contains(&ending.as_str()) {
                 continue;
             }
             // A file renamed meanwhile is no longer an image.
@@ -226,5 +226,21 @@ impl Camera for FolderCamera {
 
     fn newest(&mut self, wait: Duration) -> Result<Option<Frame>, CameraError> {
         Ok(self.next(wait)?.map(|(image, ..)| Frame { image, stamp: Stamp::default() }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_macos_writes_next_to_a_picture_is_not_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let camera = FolderCamera::watch(folder.path()).unwrap();
+        for name in ["._1.jpg", ".part.jpg", "1.jpg"] {
+            fs::write(folder.path().join(name), name).unwrap();
+        }
+        let found: Vec<PathBuf> = camera.fresh().unwrap().into_iter().map(|(_, path)| path).collect();
+        assert_eq!(found, [folder.path().join("1.jpg")]);
     }
 }

@@ -4,6 +4,7 @@ mod payload;
 mod settings;
 
 use std::{
+    cell::OnceCell,
     sync::{
         Arc, Mutex, PoisonError,
         atomic::{AtomicBool, Ordering},
@@ -67,6 +68,8 @@ pub struct GenicamCamera {
     camera: aravis::Camera,
     stream: Option<Stream>,
     chunks: Option<aravis::ChunkParser>,
+    /// Size and format of the acquisition's frames, if a frame was without them.
+    announced: OnceCell<((i32, i32), PixelFormat)>,
     ticks_per_second: i64,
     pairing: Pairing,
     /// Trigger line; `None`: the camera's first.
@@ -118,6 +121,7 @@ impl GenicamCamera {
             camera,
             stream: None,
             chunks: None,
+            announced: OnceCell::new(),
             ticks_per_second: ticks_per_second(register, feature),
             pairing: Pairing::default(),
             trigger_source: None,
@@ -182,6 +186,7 @@ impl GenicamCamera {
     fn start(&mut self) -> Result<(), CameraError> {
         let stream = self.streaming().map_err(self.failed())?;
         self.stream = Some(stream);
+        self.announced = OnceCell::new();
         self.pairing.begin();
         Ok(())
     }
@@ -252,9 +257,8 @@ impl GenicamCamera {
             }
             // Its leader has neither size nor format.
             BufferPayloadType::ChunkData => {
-                let (_, _, width, height) = self.camera.region().map_err(self.failed())?;
-                let format = self.camera.pixel_format().map_err(self.failed())?;
-                ((width, height), format, (0, 0), payload::received(buffer))
+                let (size, format) = self.announced().map_err(self.failed())?;
+                (size, format, (0, 0), payload::received(buffer))
             }
             other => {
                 let reason = format!("its frames are {other:?}, expected images without compression");
@@ -287,6 +291,16 @@ impl GenicamCamera {
         let image =
             layout.decode_padded(bytes, width, height, padding).map_err(|bad| incomplete(bad.to_string()))?;
         Ok(Frame { image, stamp })
+    }
+
+    /// Size and format do not change during an acquisition, and each query is a round trip to the camera.
+    fn announced(&self) -> Result<((i32, i32), PixelFormat), aravis::glib::Error> {
+        if let Some(known) = self.announced.get() {
+            return Ok(*known);
+        }
+        let (_, _, width, height) = self.camera.region()?;
+        let format = self.camera.pixel_format()?;
+        Ok(*self.announced.get_or_init(|| ((width, height), format)))
     }
 
     /// Number and time from chunks, else from the frame's leader.
@@ -455,12 +469,15 @@ impl Drop for GenicamCamera {
         let (camera, stream) = (self.camera.clone(), self.stream.take());
         let (ended, end) = channel();
         let stop = move || {
-            // A disconnected camera fails in both cases.
-            if stream.is_some() {
+            let answers = if stream.is_some() {
                 drop(stream);
-                let _ = camera.stop_acquisition();
+                camera.stop_acquisition().is_ok()
             } else {
-                let _ = camera.device().map(|device| device.read_register(0));
+                camera.device().is_some_and(|device| device.read_register(0).is_ok())
+            };
+            if !answers {
+                let _ = ended.send(());
+                thread::sleep(FAREWELL);
             }
             drop(camera);
             let _ = ended.send(()); // the wait may be over

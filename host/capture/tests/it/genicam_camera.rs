@@ -4,7 +4,7 @@
 use std::{
     io::Write,
     process::{Child, Command, Stdio},
-    sync::{Mutex, MutexGuard, PoisonError},
+    sync::{Mutex, MutexGuard, OnceLock, PoisonError},
     time::{Duration, Instant},
 };
 
@@ -85,12 +85,14 @@ impl Drop for Fake {
 
 /// The fake camera with text before some parts of its description, for features of real cameras.
 fn described(changes: &[(&str, &str)]) -> (Fake, tempfile::NamedTempFile) {
-    let mut text = {
+    static USUAL: OnceLock<String> = OnceLock::new();
+    let usual = || {
         let usual = Fake::start(0);
         drop(usual.open());
         let camera = aravis::Camera::new(Some(ID)).unwrap();
         camera.device().unwrap().genicam_xml().0.to_string()
     };
+    let mut text = USUAL.get_or_init(usual).clone();
     for (part, before) in changes {
         assert!(text.contains(part), "{part}");
         text = text.replacen(part, &format!("{before}{part}"), 1);

@@ -36,15 +36,27 @@ struct Rig {
     child: Child,
     port: String,
     camera: String,
+    /// Empty for a rig without GigE Vision.
     gige: String,
-    _alone: MutexGuard<'static, ()>,
+    _alone: Option<MutexGuard<'static, ()>>,
 }
 
 impl Rig {
     fn start(seed: u64, arguments: &[&str]) -> Self {
         let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+        Self::run(seed, &[&["--gige", "lo"][..], arguments].concat(), Some(alone))
+    }
+
+    /// Runs at the same time as other tests.
+    fn without_gige(seed: u64) -> Self {
+        Self::run(seed, &[], None)
+    }
+
+    fn run(seed: u64, arguments: &[&str], alone: Option<MutexGuard<'static, ()>>) -> Self {
+        // Homing from near the switches takes less time.
+        let near_home = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/it/near-home.toml");
         let mut child = Command::new(simulator())
-            .args(["run", "--gige", "lo", "--seed", &seed.to_string()])
+            .args(["run", "--seed", &seed.to_string(), "--scenario", near_home])
             .args(arguments)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -57,7 +69,8 @@ impl Rig {
                 line.split_once(&format!("\"{key}\": \"")).unwrap_or_else(|| panic!("{key}: {line}"));
             rest.split('"').next().unwrap().to_string()
         };
-        let (port, camera, gige) = (value("port"), value("camera"), value("gige"));
+        let gige = if alone.is_some() { value("gige") } else { String::new() };
+        let (port, camera) = (value("port"), value("camera"));
         Self { child, port, camera, gige, _alone: alone }
     }
 
@@ -92,7 +105,7 @@ fn pair(client: &Client, camera: &mut dyn Camera) -> Result<Pair, CaptureError> 
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn a_pair_over_gige_equals_that_of_the_endpoint() {
     let by_tcp = {
-        let rig = Rig::start(5, &[]);
+        let rig = Rig::without_gige(5);
         let mut camera = SimCamera::connect(&rig.camera).unwrap();
         pair(&rig.client(), &mut camera).unwrap()
     };
@@ -209,7 +222,7 @@ impl Camera for Damaging {
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn a_continuous_run_begins_after_an_incomplete_first_frame() {
-    let rig = Rig::start(9, &[]);
+    let rig = Rig::without_gige(9);
     let client = rig.client();
     let mut camera = Damaging(SimCamera::connect(&rig.camera).unwrap(), false);
     let shots = reach(&client, &SENSOR, &Exposures::default(), &mut |_| {}).unwrap().shots;

@@ -65,14 +65,19 @@ fn tip_of(curve: &[f32], positions: &[f64], fit_points: usize) -> Tip {
     let unit = (positions[largest + 1] - positions[largest - 1]) / 2.0;
     let [mut reciprocal, mut logarithm] = [Parabola::default(), Parabola::default()];
     let seen: Vec<usize> = window.filter(|i| curve[*i].is_finite()).collect();
+    let is_coarse = is_coarse(curve, &seen, largest);
     for (at, &i) in seen.iter().enumerate() {
         let value = f64::from((curve[i] / most).max(1e-6));
         let t = (positions[i] - positions[largest]) / unit;
         // A sample next to a gap also counts for the gap: the samples then weigh as if they were even.
         let [before, after] = [at.saturating_sub(1), (at + 1).min(seen.len() - 1)];
         let spacing = (positions[seen[after]] - positions[seen[before]]) / (unit * (after - before) as f64);
-        // Equal noise of all values: the weight is the squared inverse derivative.
-        reciprocal.add(t, -1.0 / value, value.powi(4) * spacing);
+        // Equal noise of all values: the weight is the squared inverse derivative. Three points need no weights.
+        match is_coarse {
+            true if i.abs_diff(largest) > 1 => (),
+            true => reciprocal.add(t, -1.0 / value, 1.0),
+            false => reciprocal.add(t, -1.0 / value, value.powi(4) * spacing),
+        }
         logarithm.add(t, value.ln(), value * value * spacing);
     }
     let (Some((tip, _)), Some((_, determination))) = (reciprocal.tip(), logarithm.tip()) else {
@@ -85,6 +90,23 @@ fn tip_of(curve: &[f32], positions: &[f64], fit_points: usize) -> Tip {
     }
     let reliability = rise * determination.clamp(0.0, 1.0) as f32;
     Tip { place: place as f32, reliability, sharpness: most, rise }
+}
+
+/// Largest low value, relative to the tip's, and largest height of a low value above the least, relative to the tip's height.
+const LOW: f32 = 0.4;
+const LOW_ABOVE_LEAST: f32 = 0.2;
+
+/// Whether all values but the largest and one neighbour are low: the steps are about as wide as the curve, or wider. Values
+/// beyond the neighbours are noise and the floor of a strong blur there, which would move the tip by up to half an image.
+fn is_coarse(curve: &[f32], seen: &[usize], largest: usize) -> bool {
+    let most = curve[largest];
+    let least = seen.iter().fold(most, |least, i| least.min(curve[*i]));
+    let larger = if curve[largest - 1] > curve[largest + 1] { largest - 1 } else { largest + 1 };
+    let is_low = |i: usize| {
+        let above_least = curve[i] - least;
+        curve[i] < LOW * most && above_least < LOW_ABOVE_LEAST * (most - least)
+    };
+    seen.iter().all(|i| *i == largest || *i == larger || is_low(*i))
 }
 
 /// The image number at a position, from 0 and as a fraction between images; the first or last beyond the ends.
@@ -182,6 +204,44 @@ mod tests {
                 .collect();
             let tip = tip(&curve, &positions, 11);
             assert!((tip.place - 101.3).abs() < 1.0 && tip.reliability > 0.1, "{seed}: {tip:?}");
+        }
+    }
+
+    /// Steps of 1 to 4 times the width at half height; a floor as of noise.
+    #[test]
+    fn the_floor_beside_a_coarse_peak_does_not_move_the_tip() {
+        let positions = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
+        let found = |steps: f32, tip_at: f32| {
+            let value = |p: &f64| (1.0 / (1.0 + (steps * (*p as f32 - tip_at)).powi(2))).hypot(0.03);
+            tip(&positions.each_ref().map(value), &positions, 11)
+        };
+        for (steps, most) in [(2.0, 0.01), (2.5, 0.02), (4.0, 0.05), (8.0, 0.2)] {
+            for tip_at in [1.6, 2.0, 2.25, 2.5, 2.75, 3.0, 3.4] {
+                let found = found(steps, tip_at);
+                let error = (found.place - tip_at).abs();
+                assert!(error < most && found.reliability > 0.2, "{steps}, {tip_at}: {found:?}");
+            }
+        }
+        // On an image.
+        assert!((found(8.0, 2.0).place - 2.0).abs() < 1e-4);
+        // Neighbours whose fourth power is below the precision of the sums.
+        assert_eq!(tip(&[0.001, 0.002, 1.0, 0.002, 0.001, 0.001], &positions, 11).place, 2.0);
+    }
+
+    #[test]
+    fn only_a_single_peak_of_one_or_two_images_is_coarse() {
+        for (curve, expected) in [
+            (vec![0.02, 0.05, 1.0, 0.5, 0.04, 0.02], true),
+            (vec![0.3, 0.34, 1.0, 0.9, 0.3, 0.31], true),
+            // A bad image next to the tip; two surfaces; half a width apart; four images close to the tip.
+            (vec![0.6, 0.8, 0.05, 1.0, 0.9, 0.7, 0.5], false),
+            (vec![0.1, 1.0, 0.1, 0.9, 0.1], false),
+            (vec![0.1, 0.2, 0.5, 1.0, 0.5, 0.2, 0.1], false),
+            (vec![0.83, 1.0, 1.0, 0.83], false),
+        ] {
+            let largest = (0..curve.len()).max_by(|a, b| f32::total_cmp(&curve[*a], &curve[*b])).unwrap();
+            let seen: Vec<usize> = (0..curve.len()).collect();
+            assert_eq!(is_coarse(&curve, &seen, largest), expected, "{curve:?}");
         }
     }
 

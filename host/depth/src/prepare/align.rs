@@ -18,6 +18,7 @@ use serde::{Deserialize, Serialize};
 use super::band::{band, halved, normalised};
 use super::thinned::Thinned;
 use super::warp::Warp;
+use crate::simd::{self, Backend};
 use step::{LEAST_SCALE, Step};
 
 /// Most pixels of the level that rules out a displacement.
@@ -223,45 +224,43 @@ fn levels(pair: &Thinned) -> Option<Vec<Level>> {
     }
 }
 
-/// A row of the far image in the near one.
-struct MovedRow<'a> {
-    pixels: &'a [f32],
-    width: usize,
-    warp: &'a Warp,
-    y: f64,
-    /// Columns whose places lie within the near image's border.
-    inside: Range<usize>,
-}
-
-impl<'a> MovedRow<'a> {
-    fn new(image: &'a Array2<f32>, warp: &'a Warp, y: usize, columns: Range<usize>) -> Self {
-        let (height, width) = image.dim();
-        let (border, y) = (BORDER_PX as f64, y as f64);
-        let is_inside = |column: &usize| {
-            let [x, y] = warp.at([*column as f64, y]);
-            let [right, bottom] = [width, height].map(|n| (n - 1) as f64 - border);
-            x >= border && y >= border && x < right && y < bottom
-        };
-        let pixels = image.as_slice().unwrap_or_default();
-        // An affine map sends one stretch of a row into the image.
-        let start = columns.clone().find(is_inside).unwrap_or(columns.end);
-        let end = (start..columns.end).rev().find(is_inside).map_or(start, |last| last + 1);
-        Self { pixels, width, warp, y, inside: start..end }
+/// Writes the near image's bilinear values at the places of the far one's row `y` to `to`. Returns the columns whose places lie
+/// within the near image's border; only these are written.
+fn moved_row(near: &Array2<f32>, warp: &Warp, y: usize, to: &mut [f32]) -> Range<usize> {
+    let (height, width) = near.dim();
+    let pixels = near.as_slice().unwrap_or_default();
+    let place = |column: usize| warp.at([column as f64, y as f64]);
+    let is_inside = |column: &usize| {
+        let ([x, y], border) = (place(*column), BORDER_PX as f64);
+        let [right, bottom] = [width, height].map(|n| (n - 1) as f64 - border);
+        x >= border && y >= border && x < right && y < bottom
+    };
+    // An affine map sends one stretch of a row into the image.
+    let columns = BORDER_PX..width - BORDER_PX;
+    let start = columns.clone().find(is_inside).unwrap_or(columns.end);
+    let end = (start..columns.end).rev().find(is_inside).map_or(start, |last| last + 1);
+    let (backend, [[a, _], [c, _]]) = (Backend::best(), warp.matrix);
+    let mut from = start;
+    while from < end {
+        let [x, y] = place(from);
+        let (left, top) = (x as usize, y as usize);
+        // The columns between the same two rows whose places follow each other: an interval but for rounding.
+        let (mut last, mut beyond) = (from, end);
+        while last + 1 < beyond {
+            let column = last.midpoint(beyond);
+            let [x, y] = place(column);
+            if (x as usize, y as usize) == (left + (column - from), top) {
+                last = column;
+            } else {
+                beyond = column;
+            }
+        }
+        let rows = [top, top + 1].map(|row| &pixels[row * width + left..][..=beyond - from]);
+        let at = [x - left as f64, y - top as f64].map(|part| part as f32);
+        simd::between_rows(backend, rows, at, [(a - 1.0) as f32, c as f32], &mut to[from..beyond]);
+        from = beyond;
     }
-
-    /// Bilinear value at a column that is inside.
-    #[inline(always)]
-    fn value(&self, column: usize) -> f32 {
-        let [x, y] = self.warp.at([column as f64, self.y]);
-        let (left, top) = (x as i32, y as i32);
-        let (fx, fy) = ((x - f64::from(left)) as f32, (y - f64::from(top)) as f32);
-        let at = top as usize * self.width + left as usize;
-        let [upper, lower] = [at, at + self.width].map(|at| {
-            let pair = &self.pixels[at..at + 2];
-            pair[0] + fx * (pair[1] - pair[0])
-        });
-        upper + fy * (lower - upper)
-    }
+    start..end
 }
 
 /// The best shift of all up to a quarter of the image.
@@ -287,18 +286,17 @@ fn best_shift(level: &Level, start: Warp) -> Warp {
 /// Correlation of the far image with the near one resampled by `warp`; 0 if too little overlaps.
 fn correlation(level: &Level, warp: &Warp) -> f64 {
     let (height, width) = level.far.dim();
-    let [mut product, mut of_far, mut of_near, mut count] = [0.0_f64; 4];
+    let (mut sums, mut count, mut near) = ([0.0_f64; 3], 0.0, vec![0.0; width]);
     let step = (level.far.len() / STEP_PX).max(1);
+    let far = level.far.as_slice().unwrap_or_default();
     for y in (BORDER_PX..height - BORDER_PX).step_by(step) {
-        let row = MovedRow::new(&level.near, warp, y, BORDER_PX..width - BORDER_PX);
-        for x in row.inside.clone() {
-            let [far, near] = [level.far[(y, x)], row.value(x)].map(f64::from);
-            product += far * near;
-            of_far += far * far;
-            of_near += near * near;
-        }
-        count += row.inside.len() as f64;
+        let inside = moved_row(&level.near, warp, y, &mut near);
+        let of_row =
+            simd::products(Backend::best(), &far[y * width..][inside.clone()], &near[inside.clone()]);
+        sums.iter_mut().zip(of_row).for_each(|(sum, value)| *sum += value);
+        count += inside.len() as f64;
     }
+    let [product, of_far, of_near] = sums;
     let enough = count * step as f64 > 0.25 * level.far.len() as f64;
     if enough && of_far > 0.0 && of_near > 0.0 { product / (of_far * of_near).sqrt() } else { 0.0 }
 }
@@ -340,6 +338,42 @@ mod tests {
             // With its standard error, some hundredths here.
             assert!((shift - 0.01..shift + 0.04).contains(&px), "{shift}: {px}");
         }
+    }
+
+    #[test]
+    fn a_moved_row_is_bilinear_at_each_place() {
+        let image = Array2::from_shape_fn((61, 83), |(y, x)| ((y * 7919 + x * x * 31) % 101) as f32 / 101.0);
+        let size = image.dim();
+        let about = |magnification: f64, degrees: f64, shift: [f64; 2]| {
+            Warp::about_middle(size, magnification, degrees, shift)
+        };
+        let warps = [
+            Warp::IDENTITY,
+            about(1.0, 0.0, [2.0, -1.0]),
+            about(1.0, 0.0, [1e9, 0.0]),
+            about(1.02, 0.7, [0.4, 1.3]),
+            about(0.98, -3.0, [-5.5, 0.0]),
+            about(1.0, 90.0, [0.0; 2]),
+            about(1.0, 180.0, [0.3; 2]),
+            about(0.1, 5.0, [0.0; 2]),
+            about(10.0, 0.0, [0.0; 2]),
+        ];
+        let mut columns = 0;
+        for (warp, y) in warps.iter().flat_map(|warp| (BORDER_PX..size.0 - BORDER_PX).map(move |y| (warp, y)))
+        {
+            let mut found = vec![0.0; size.1];
+            let inside = moved_row(&image, warp, y, &mut found);
+            columns += inside.len();
+            for x in inside {
+                let [px, py] = warp.at([x as f64, y as f64]);
+                let (left, top) = (px as usize, py as usize);
+                let [fx, fy] = [px - left as f64, py - top as f64].map(|part| part as f32);
+                let along = |row: usize| image[(row, left)] * (1.0 - fx) + image[(row, left + 1)] * fx;
+                let expected = along(top) * (1.0 - fy) + along(top + 1) * fy;
+                assert!((found[x] - expected).abs() < 1e-4, "{warp:?} {x} {y}: {} {expected}", found[x]);
+            }
+        }
+        assert!(columns > 20_000, "{columns}");
     }
 
     #[test]

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::median::deviation;
 use crate::operators::least_squares;
+use crate::simd::{self, Backend};
 
 /// Blocks along the shorter side.
 const BLOCKS: usize = 24;
@@ -112,15 +113,18 @@ impl Gain {
     /// Divides an image by the gain at each place.
     pub fn divide_by_field(&self, image: &mut ArrayViewMut2<f32>) {
         let size = image.dim();
-        let reciprocal = self.polynomial.reciprocal;
+        let (backend, reciprocal) = (Backend::best(), self.polynomial.reciprocal);
         image.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(y, mut row)| {
             let [first, v] = field([0.0, y as f64], size);
             let step = field([1.0, 0.0], size)[0] - field([0.0, 0.0], size)[0];
             let of_row = self.polynomial.of_row(v);
-            for (x, value) in row.iter_mut().enumerate() {
-                let u = (first + step * x as f64) as f32;
-                let gain = of_row.iter().rev().fold(0.0_f32, |sum, c| sum * u + c);
-                *value = if reciprocal { *value * gain } else { *value / gain };
+            match row.as_slice_mut() {
+                Some(row) => simd::divide_by_polynomial(backend, of_row, [first, step], reciprocal, row),
+                None => {
+                    let mut values = row.to_vec();
+                    simd::divide_by_polynomial(backend, of_row, [first, step], reciprocal, &mut values);
+                    row.iter_mut().zip(values).for_each(|(to, value)| *to = value);
+                }
             }
         });
     }
@@ -160,12 +164,13 @@ struct Fit {
 impl Fit {
     /// `terms` and `targets` have a value for each of the blocks that `weights` are of.
     fn new(targets: &[Vec<f64>], weights: &[f64], terms: &[Vec<f64>]) -> Option<Self> {
-        let fits = targets.iter().enumerate().filter_map(|(which, target)| {
+        let fit = |(which, target): (usize, &Vec<f64>)| {
             let (coefficients, rms) = robust(terms, target, weights)?;
             let mean = target.iter().sum::<f64>() / target.len() as f64;
             Some((rms / mean, Self { which, coefficients, rms }))
-        });
-        fits.min_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, fit)| fit)
+        };
+        let fits: Vec<_> = targets.par_iter().enumerate().filter_map(fit).collect();
+        fits.into_iter().min_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, fit)| fit)
     }
 }
 
@@ -303,6 +308,9 @@ mod tests {
             assert!(gain.varies(1e-3), "{gain:?}");
             let mut mended = near.clone();
             gain.divide_by_field(&mut mended.view_mut());
+            let mut by_columns = near.t().to_owned();
+            gain.divide_by_field(&mut by_columns.view_mut().reversed_axes());
+            assert_eq!(by_columns.t(), mended);
             for (a, b) in mended.iter().zip(&far) {
                 assert!((a / b - 1.0).abs() < 2e-3, "{a} {b}");
             }

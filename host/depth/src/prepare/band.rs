@@ -4,7 +4,7 @@
 //! vignetting change the brightness of one image. A band of middle frequencies, divided by its RMS around each pixel, is
 //! equal in both images of an object. Point spread functions are symmetric, so different blur does not bias a shift.
 
-use ndarray::{Array2, ArrayView2, Axis, CowArray, Ix2, Zip};
+use ndarray::{Array2, ArrayView2, Axis, CowArray, Ix2};
 use rayon::prelude::*;
 
 use crate::border::reflect;
@@ -61,20 +61,39 @@ pub(crate) fn without_holes(image: ArrayView2<'_, f32>) -> CowArray<'_, f32, Ix2
     if image.axis_iter(Axis(0)).into_par_iter().all(whole) {
         return image.into();
     }
-    let (sum, count) = image
-        .iter()
-        .filter(|v| v.is_finite())
-        .fold((0.0_f64, 0.0_f64), |(sum, count), v| (sum + f64::from(*v), count + 1.0));
+    let of_row = |row: ndarray::ArrayView1<f32>| {
+        row.iter().filter(|v| v.is_finite()).fold((0.0, 0.0), |(sum, n), v| (sum + f64::from(*v), n + 1.0))
+    };
+    let of_rows: Vec<(f64, f64)> = image.axis_iter(Axis(0)).into_par_iter().map(of_row).collect();
+    let (sum, count) = of_rows.into_iter().fold((0.0, 0.0), |(sum, n), row| (sum + row.0, n + row.1));
     let mean = if count > 0.0 { (sum / count) as f32 } else { 0.0 };
-    image.mapv(|v| if v.is_finite() { v } else { mean }).into()
+    let mut filled = image.into_owned();
+    filled.par_mapv_inplace(|v| if v.is_finite() { v } else { mean });
+    filled.into()
 }
 
-/// The band: the image blurred by a binomial of five taps, minus its mean over [`MEAN_PX`].
+/// The band: the image blurred by a binomial of five taps, minus its mean over [`MEAN_PX`]. Each blurred row is kept while a
+/// window contains it.
 pub(crate) fn band(image: ArrayView2<f32>) -> Array2<f32> {
-    let fine = binomial(image);
-    let mut coarse = box_mean(fine.view(), MEAN_PX);
-    Zip::from(&mut coarse).and(&fine).par_for_each(|coarse, fine| *coarse = fine - *coarse);
-    coarse
+    let (size, width) = (image.dim(), image.ncols());
+    let image = image.as_standard_layout();
+    let mut result = Array2::zeros(size);
+    let rows = rows_of_part(size.0);
+    result.axis_chunks_iter_mut(Axis(0), rows).into_par_iter().enumerate().for_each(|(part, mut band)| {
+        let mut rolling = RollingMean::new(size, MEAN_PX);
+        let (mut fine, mut across) = (vec![0.0_f32; MEAN_PX * width], vec![0.0_f32; width + 4]);
+        let place = |y: usize| (y % MEAN_PX) * width..(y % MEAN_PX + 1) * width;
+        for (i, mut row) in band.axis_iter_mut(Axis(0)).enumerate() {
+            let (y, row) = (part * rows + i, row.as_slice_mut().unwrap_or_default());
+            let blurred = |y: usize, row: &mut [f32]| {
+                binomial_row(&image, y, &mut across, row);
+                fine[place(y)].copy_from_slice(row);
+            };
+            rolling.mean(y, blurred, row);
+            row.iter_mut().zip(&fine[place(y)]).for_each(|(value, fine)| *value = fine - *value);
+        }
+    });
+    result
 }
 
 /// Factor of [`band`] on the variance of white noise: the sum of its squared taps.
@@ -100,11 +119,15 @@ pub(crate) fn normalised(band: &Array2<f32>) -> Array2<f32> {
         .collect();
     let mean = of_rows.iter().sum::<f64>() / band.len() as f64;
     let floor = (FLOOR * mean as f32).max(f32::MIN_POSITIVE);
-    let mut strength = box_mean_of(band.dim(), STRENGTH_PX, |y, row| product(band, band, y, row));
-    Zip::from(&mut strength)
-        .and(band)
-        .par_for_each(|strength, band| *strength = band / (*strength + floor).sqrt());
-    strength
+    let backend = Backend::best();
+    means_of(
+        band.dim(),
+        STRENGTH_PX,
+        |y, row| product(band, band, y, row),
+        |y, row| {
+            simd::divide_by_root(backend, band.row(y).to_slice().unwrap_or_default(), floor, row);
+        },
+    )
 }
 
 /// Row `y` of a product.
@@ -113,47 +136,44 @@ pub(crate) fn product(a: &Array2<f32>, b: &Array2<f32>, y: usize, row: &mut [f32
     row.iter_mut().zip(a).zip(b).for_each(|((to, a), b)| *to = a * b);
 }
 
-/// Binomial of five taps along both axes; borders reflected.
-fn binomial(image: ArrayView2<f32>) -> Array2<f32> {
+/// Row `y` of an image blurred by a binomial of five taps along both axes; borders reflected. `across` has four columns more.
+fn binomial_row(image: &CowArray<f32, Ix2>, y: usize, across: &mut [f32], to: &mut [f32]) {
     const WEIGHTS: [f32; 5] = [0.0625, 0.25, 0.375, 0.25, 0.0625];
-    let (height, width) = image.dim();
-    let backend = Backend::best();
-    let image = image.as_standard_layout();
-    let mut result = Array2::zeros((height, width));
-    result.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each_init(
-        || vec![0.0_f32; width + 4],
-        |row_sum, (y, mut row)| {
-            let rows = [-2, -1, 0, 1, 2].map(|tap| image.row(reflect(y as isize + tap, height)));
-            let rows = rows.each_ref().map(|row| row.as_slice().unwrap_or_default());
-            simd::weigh_rows(backend, rows, WEIGHTS, &mut row_sum[2..2 + width]);
-            for d in 1..=2_isize {
-                row_sum[(2 - d) as usize] = row_sum[2 + reflect(-d, width)];
-                row_sum[(width as isize + 1 + d) as usize] =
-                    row_sum[2 + reflect(width as isize - 1 + d, width)];
-            }
-            let Some(row) = row.as_slice_mut() else { unreachable!("made in standard layout") };
-            simd::weigh_rows(backend, [0, 1, 2, 3, 4].map(|tap| &row_sum[tap..]), WEIGHTS, row);
-        },
-    );
-    result
+    let ((height, width), backend) = (image.dim(), Backend::best());
+    let rows = [-2, -1, 0, 1, 2].map(|tap| image.row(reflect(y as isize + tap, height)));
+    let rows = rows.each_ref().map(|row| row.as_slice().unwrap_or_default());
+    simd::weigh_rows(backend, rows, WEIGHTS, &mut across[2..2 + width]);
+    for d in 1..=2_isize {
+        across[(2 - d) as usize] = across[2 + reflect(-d, width)];
+        across[(width as isize + 1 + d) as usize] = across[2 + reflect(width as isize - 1 + d, width)];
+    }
+    simd::weigh_rows(backend, [0, 1, 2, 3, 4].map(|tap| &across[tap..]), WEIGHTS, to);
 }
 
 /// Mean over a window of odd side around each pixel, fewer pixels at the borders.
 pub(crate) fn box_mean(image: ArrayView2<f32>, side: usize) -> Array2<f32> {
-    box_mean_of(image.dim(), side, |y, row| match image.row(y).as_slice() {
+    let source = |y: usize, row: &mut [f32]| match image.row(y).as_slice() {
         Some(from) => row.copy_from_slice(from),
         None => row.iter_mut().zip(image.row(y)).for_each(|(to, from)| *to = *from),
-    })
+    };
+    means_of(image.dim(), side, source, |_, _| ())
 }
 
-/// [`box_mean`] of the rows that `source` writes, of (height, width).
-fn box_mean_of(size: (usize, usize), side: usize, source: impl Fn(usize, &mut [f32]) + Sync) -> Array2<f32> {
+/// [`box_mean`] of the rows that `source` writes, of (height, width). `finish` changes each row of means.
+fn means_of(
+    size: (usize, usize),
+    side: usize,
+    source: impl Fn(usize, &mut [f32]) + Sync,
+    finish: impl Fn(usize, &mut [f32]) + Sync,
+) -> Array2<f32> {
     let mut result = Array2::zeros(size);
     let rows = rows_of_part(size.0);
     result.axis_chunks_iter_mut(Axis(0), rows).into_par_iter().enumerate().for_each(|(part, mut means)| {
         let mut rolling = RollingMean::new(size, side);
         for (i, mut row) in means.axis_iter_mut(Axis(0)).enumerate() {
-            rolling.mean(part * rows + i, &source, row.as_slice_mut().unwrap_or_default());
+            let (y, row) = (part * rows + i, row.as_slice_mut().unwrap_or_default());
+            rolling.mean(y, &source, row);
+            finish(y, row);
         }
     });
     result
@@ -194,7 +214,7 @@ impl RollingMean {
     }
 
     /// Means around the pixels of row `y`, which follows the one before.
-    pub(crate) fn mean(&mut self, y: usize, source: impl Fn(usize, &mut [f32]), to: &mut [f32]) {
+    pub(crate) fn mean(&mut self, y: usize, mut source: impl FnMut(usize, &mut [f32]), to: &mut [f32]) {
         let Self { backend, height, reach: r, sums, kept, row, work, summed } = self;
         let width = row.len();
         let place = |y: usize| (y % (2 * *r + 2)) * width..(y % (2 * *r + 2) + 1) * width;
@@ -229,9 +249,15 @@ impl RollingMean {
 fn means_along(backend: Backend, from: &[f32], r: usize, work: &mut [f32], to: &mut [f32]) {
     let width = from.len();
     let inner = r.min(width)..width.saturating_sub(r).max(r.min(width));
-    for x in (0..inner.start).chain(inner.end..width) {
-        let window = &from[x.saturating_sub(r)..(x + r + 1).min(width)];
-        to[x] = window.iter().sum::<f32>() / window.len() as f32;
+    let mut sum: f32 = from[..inner.start].iter().sum();
+    for x in 0..inner.start {
+        sum += from.get(x + r).unwrap_or(&0.0);
+        to[x] = sum / (x + r + 1).min(width) as f32;
+    }
+    let mut sum: f32 = from[width.saturating_sub(r)..].iter().sum();
+    for x in (inner.end..width).rev() {
+        sum += from[x - r];
+        to[x] = sum / (width - (x - r)) as f32;
     }
     if width > 2 * r {
         let share = 1.0 / (2 * r + 1) as f32;
@@ -247,13 +273,14 @@ mod tests {
 
     #[test]
     fn means_are_those_of_the_window() {
-        let image = Array2::from_shape_fn((70, 23), |(y, x)| ((y * 31 + x * 17) % 23) as f32);
-        let found = box_mean(image.view(), 9);
-        for (y, x) in [(0_usize, 0_usize), (5, 9), (33, 22), (69, 11), (64, 3)] {
-            let rows = y.saturating_sub(4)..(y + 5).min(70);
-            let columns = x.saturating_sub(4)..(x + 5).min(23);
-            let window = image.slice(ndarray::s![rows, columns]);
-            assert!((found[(y, x)] - window.sum() / window.len() as f32).abs() < 1e-4);
+        for width in [1, 3, 4, 5, 8, 9, 23] {
+            let image = Array2::from_shape_fn((70, width), |(y, x)| ((y * 31 + x * 17) % 23) as f32);
+            for ((y, x), found) in box_mean(image.view(), 9).indexed_iter() {
+                let rows = y.saturating_sub(4)..(y + 5).min(70);
+                let columns = x.saturating_sub(4)..(x + 5).min(width);
+                let window = image.slice(ndarray::s![rows, columns]);
+                assert!((found - window.sum() / window.len() as f32).abs() < 1e-4, "{width} {x} {y}");
+            }
         }
     }
 

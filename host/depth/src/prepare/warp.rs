@@ -1,9 +1,13 @@
 //! An affine map from the pixels of one image to another, and resampling by it. Coordinates are (x, y) in pixels, the
 //! centre of the first pixel at (0, 0).
 
+use std::ops::Range;
+
 use ndarray::{Array2, ArrayView2, Axis};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+
+use crate::simd::{self, Backend};
 
 /// Taps of the interpolation along each axis: Lanczos' kernel of three lobes.
 const TAPS: usize = 6;
@@ -137,14 +141,6 @@ impl Lanczos {
         };
         Self((0..=PHASES).map(weights).collect())
     }
-
-    /// First tap and phase of a place along an axis, from -1 on.
-    fn at(place: f64) -> (i32, u16) {
-        // Positive, so truncation is the floor, without a call.
-        let whole = (place + 1.0) as i32 - 1;
-        let phase = ((place - f64::from(whole)) * PHASES as f64 + 0.5) as i32;
-        (whole - 2, phase.min(PHASES as i32) as u16)
-    }
 }
 
 /// The image resampled by `warp`: pixel `p` of the result is `image` at `warp(p)`, interpolated by Lanczos' kernel of
@@ -161,59 +157,83 @@ pub(crate) fn resample_by(image: ArrayView2<f32>, map: impl Fn([f64; 2]) -> [f64
     let standard = image.as_standard_layout();
     let Some(pixels) = standard.as_slice() else { unreachable!("made in standard layout") };
     let lanczos = Lanczos::new();
+    let backend = Backend::best();
     let mut result = Array2::zeros((height, width));
     result.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each_init(
-        || (Vec::with_capacity(width), vec![0.0_f32; width]),
+        || (Places::new(width), vec![0.0_f32; width]),
         |(places, columns), (y, mut row)| {
-            places.clear();
-            places.extend((0..width).map(|x| Taps::at(map([x as f64, y as f64]), (height, width))));
+            let row = row.as_slice_mut().unwrap_or_default();
+            places.of_row(backend, (0..width).map(|x| map([x as f64, y as f64])), (height, width));
             let mut start = 0;
-            for part in places.chunk_by(|a, b| a.rows() == b.rows()) {
-                let to = &mut row.as_slice_mut().unwrap_or_default()[start..start + part.len()];
-                start += part.len();
-                match part[0].rows() {
-                    Some(rows) => along_rows(pixels, width, &lanczos, rows, part, columns, to),
-                    None => to.iter_mut().zip(part).for_each(|(to, taps)| {
-                        *to = taps.at_border(pixels, (height, width), &lanczos);
-                    }),
+            while start < width {
+                let rows = places.rows[start];
+                let length = places.rows[start..].iter().take_while(|other| **other == rows).count();
+                let part = start..start + length;
+                let to = &mut row[part.clone()];
+                if rows == Places::AT_BORDER {
+                    for (x, to) in part.zip(to) {
+                        *to = places.at_border(x, pixels, (height, width), &lanczos);
+                    }
+                } else {
+                    places.along_rows(backend, part, pixels, &lanczos, columns, to);
                 }
+                start += length;
             }
         },
     );
     result
 }
 
-/// Source of a pixel of the result.
-#[derive(Clone, Copy)]
-struct Taps {
-    first: [i32; 2],
-    phase: [u16; 2],
-    inside: Option<bool>,
+/// Sources of the pixels of a row.
+struct Places {
+    /// Places in the image, x and y.
+    at: [Vec<f64>; 2],
+    /// First tap along each axis.
+    first: [Vec<i32>; 2],
+    phase: [Vec<i32>; 2],
+    /// Equal for pixels between the same rows at the same phase, if all taps lie in the image.
+    rows: Vec<i32>,
 }
 
-impl Taps {
-    fn at([x, y]: [f64; 2], (height, width): (usize, usize)) -> Self {
-        if !(x >= -0.5 && y >= -0.5 && x <= width as f64 - 0.5 && y <= height as f64 - 0.5) {
-            return Self { first: [0; 2], phase: [0; 2], inside: None };
-        }
-        let ((left, across), (top, down)) = (Lanczos::at(x), Lanczos::at(y));
-        let whole = |first: i32, n: usize| first >= 0 && first as usize + TAPS <= n;
-        let inside = whole(left, width) && whole(top, height);
-        Self { first: [left, top], phase: [across, down], inside: Some(inside) }
+impl Places {
+    const AT_BORDER: i32 = -1;
+
+    fn new(width: usize) -> Self {
+        let integers = || [vec![0; width], vec![0; width]];
+        let at = [vec![0.0; width], vec![0.0; width]];
+        Self { at, first: integers(), phase: integers(), rows: vec![0; width] }
     }
 
-    /// First row and vertical phase, if all taps lie in the image.
-    fn rows(&self) -> Option<[usize; 2]> {
-        self.inside.filter(|inside| *inside).map(|_| [self.first[1] as usize, self.phase[1].into()])
+    fn of_row(
+        &mut self,
+        backend: Backend,
+        places: impl Iterator<Item = [f64; 2]>,
+        (height, width): (usize, usize),
+    ) {
+        let [xs, ys] = &mut self.at;
+        for ((place, x), y) in places.zip(xs).zip(ys) {
+            [*x, *y] = place;
+        }
+        for axis in 0..2 {
+            let (first, phase) = (&mut self.first[axis], &mut self.phase[axis]);
+            simd::find_taps(backend, &self.at[axis], PHASES as f64, first, phase);
+        }
+        let last = [width, height].map(|n| n as i32 - TAPS as i32);
+        let [left, top] = [&self.first[0], &self.first[1]];
+        for (((rows, left), top), phase) in self.rows.iter_mut().zip(left).zip(top).zip(&self.phase[1]) {
+            let inside = (*left >= 0) & (*top >= 0) & (*left <= last[0]) & (*top <= last[1]);
+            *rows = if inside { (*top << 10) | *phase } else { Self::AT_BORDER };
+        }
     }
 
     /// Value near the border: taps beyond it take the nearest pixel. NaN outside.
-    fn at_border(&self, pixels: &[f32], (height, width): (usize, usize), lanczos: &Lanczos) -> f32 {
-        if self.inside.is_none() {
+    fn at_border(&self, x: usize, pixels: &[f32], (height, width): (usize, usize), lanczos: &Lanczos) -> f32 {
+        let is_within = |axis: usize, n: usize| (-0.5..=n as f64 - 0.5).contains(&self.at[axis][x]);
+        if !(is_within(0, width) && is_within(1, height)) {
             return f32::NAN;
         }
-        let [across, down] = self.phase.map(|phase| &lanczos.0[usize::from(phase)]);
-        let [left, top] = self.first.map(|first| first as isize);
+        let [across, down] = [0, 1].map(|axis| &lanczos.0[self.phase[axis][x] as usize]);
+        let [left, top] = [0, 1].map(|axis| self.first[axis][x] as isize);
         let inside = |i: isize, n: usize| i.clamp(0, n as isize - 1) as usize;
         let column = |column: isize| -> f32 {
             let at = inside(left + column, width);
@@ -222,33 +242,31 @@ impl Taps {
         };
         across.iter().enumerate().map(|(i, weight)| column(i as isize) * weight).sum()
     }
-}
 
-/// Values between the same rows, which are interpolated vertically once for all columns.
-fn along_rows(
-    pixels: &[f32],
-    width: usize,
-    lanczos: &Lanczos,
-    [top, phase]: [usize; 2],
-    places: &[Taps],
-    columns: &mut [f32],
-    to: &mut [f32],
-) {
-    let lefts = || places.iter().map(|taps| taps.first[0] as usize);
-    let (Some(from), Some(last)) = (lefts().min(), lefts().max()) else { return };
-    let columns = &mut columns[..last + TAPS - from];
-    let [a, b, c, d, e, f]: [&[f32]; TAPS] = std::array::from_fn(|row| {
-        let start = (top + row) * width + from;
-        &pixels[start..start + columns.len()]
-    });
-    let w = &lanczos.0[phase];
-    for (x, sum) in columns.iter_mut().enumerate() {
-        *sum = w[0] * a[x] + w[1] * b[x] + w[2] * c[x] + w[3] * d[x] + w[4] * e[x] + w[5] * f[x];
-    }
-    for (to, taps) in to.iter_mut().zip(places) {
-        let at = taps.first[0] as usize - from;
-        let weights = &lanczos.0[usize::from(taps.phase[0])];
-        *to = columns[at..at + TAPS].iter().zip(weights).map(|(value, weight)| value * weight).sum();
+    /// Values of pixels between the same rows, which are interpolated vertically once for all columns.
+    fn along_rows(
+        &self,
+        backend: Backend,
+        part: Range<usize>,
+        pixels: &[f32],
+        lanczos: &Lanczos,
+        columns: &mut [f32],
+        to: &mut [f32],
+    ) {
+        let width = columns.len();
+        let (top, phase) = (self.first[1][part.start] as usize, self.phase[1][part.start] as usize);
+        let lefts = &self.first[0][part.clone()];
+        let (Some(from), Some(last)) = (lefts.iter().min(), lefts.iter().max()) else { return };
+        let (from, last) = (*from as usize, *last as usize);
+        let columns = &mut columns[..last + TAPS - from];
+        let rows: [&[f32]; TAPS] =
+            std::array::from_fn(|row| &pixels[(top + row) * width + from..][..columns.len()]);
+        simd::weigh_six_rows(backend, rows, lanczos.0[phase], columns);
+        for ((to, left), phase) in to.iter_mut().zip(lefts).zip(&self.phase[0][part]) {
+            let at = *left as usize - from;
+            let weights = &lanczos.0[*phase as usize];
+            *to = columns[at..at + TAPS].iter().zip(weights).map(|(value, weight)| value * weight).sum();
+        }
     }
 }
 
@@ -298,6 +316,17 @@ mod tests {
             }
             if py > 39.5 {
                 assert!(value.is_nan());
+            }
+        }
+    }
+
+    #[test]
+    fn places_that_are_not_numbers_are_outside() {
+        let image = Array2::from_elem((20, 30), 1.0_f32);
+        for shift in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            for shift in [[shift, 0.0], [0.0, shift]] {
+                let seen = resample(image.view(), &Warp { shift, ..Warp::IDENTITY });
+                assert!(seen.iter().all(|value| value.is_nan()), "{shift:?}");
             }
         }
     }

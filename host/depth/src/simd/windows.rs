@@ -1,5 +1,5 @@
 //! Rows of the estimator with several window sizes: sums along rows, the cubic's root with its slope, residual and
-//! deviation. Plain loops along rows, vectorised by the compiler.
+//! deviation. Plain loops along rows, vectorised by the compiler; roots by [`Lanes`], for their reciprocals.
 
 use super::dispatch;
 use super::lanes::Lanes;
@@ -9,6 +9,8 @@ const LARGEST_ALPHA: f32 = 1.2;
 /// Slope of the cubic, relative to c1, below which Newton's step is shortened.
 const SLOPE_FLOOR: f32 = 0.05;
 const STEPS: usize = 3;
+/// Least c1: its reciprocal, and that of [`SLOPE_FLOOR`] of it, are finite.
+const LEAST_SLOPE: f32 = 1e-30;
 pub(crate) const MAX_LANES: usize = 16;
 
 dispatch! {
@@ -52,6 +54,11 @@ fn row_sums_generic<L: Lanes>(values: &[f32], window: usize, work: &mut [f32], s
         13 => {
             let (a, b, c, d) = (at(0), quad(1), quad(5), quad(9));
             (0..width).for_each(|x| sums[x] = (a[x] + b[x]) + (c[x] + d[x]));
+            return;
+        }
+        15 => {
+            let (a, b, c, d, e, f) = (at(0), at(1), at(2), quad(3), quad(7), quad(11));
+            (0..width).for_each(|x| sums[x] = ((a[x] + (b[x] + c[x])) + d[x]) + (e[x] + f[x]));
             return;
         }
         21 => {
@@ -136,24 +143,70 @@ fn roots_generic<L: Lanes>(sums: CubicSums<'_>, of_noise: OfNoise, found: Found<
     let [c0, c1, c2, c3] = sums.c.map(|c| &c[..width]);
     let (energy, noise) = (&sums.energy[..width], &sums.noise[..width]);
     let (alphas, variances) = (&mut found.alpha[..width], &mut found.variance[..width]);
-    for x in 0..width {
-        // In constant regions rounding leaves energies of 0 or below.
-        let energy = energy[x].max(f32::MIN_POSITIVE);
-        let expected = of_noise.energy * noise[x];
-        let evidence = (energy - expected).max(of_noise.least_evidence * energy);
-        let c1 = (c1[x] - of_noise.c1 * noise[x]).max(of_noise.least_slope * evidence);
-        let c3 = c3[x] - of_noise.c3 * noise[x];
-        let least = SLOPE_FLOOR * c1;
-        let mut alpha = (-c0[x] / c1).clamp(-LARGEST_ALPHA, LARGEST_ALPHA);
-        let mut slope = c1;
-        for _ in 0..STEPS {
-            let value = ((c3 * alpha + c2[x]) * alpha + c1) * alpha + c0[x];
-            slope = ((3.0 * c3 * alpha + 2.0 * c2[x]) * alpha + c1).max(least);
-            alpha = (alpha - value / slope).clamp(-LARGEST_ALPHA, LARGEST_ALPHA);
+    let whole = width - width % L::N;
+    for x in (0..whole).step_by(L::N) {
+        let end = x + L::N;
+        let given = [&c0[x..end], &c1[x..end], &c2[x..end], &c3[x..end], &energy[x..end], &noise[x..end]];
+        root_columns::<L>(given, of_noise, &mut alphas[x..end], &mut variances[x..end]);
+    }
+    if whole < width {
+        let rest = width - whole;
+        let (mut given, mut alpha, mut variance) =
+            ([[0.0; MAX_LANES]; 6], [0.0; MAX_LANES], [0.0; MAX_LANES]);
+        for (to, from) in given.iter_mut().zip([c0, c1, c2, c3, energy, noise]) {
+            to[..rest].copy_from_slice(&from[whole..]);
         }
-        alphas[x] = alpha;
-        let known = expected > 0.0 && energy > 0.5 * expected;
-        variances[x] = if known { energy / (slope * slope) } else { f32::INFINITY };
+        let [a, b, c, d, e, f] = &given;
+        root_columns::<L>([a, b, c, d, e, f], of_noise, &mut alpha, &mut variance);
+        alphas[whole..].copy_from_slice(&alpha[..rest]);
+        variances[whole..].copy_from_slice(&variance[..rest]);
+    }
+    for x in 0..width {
+        let expected = of_noise.energy * noise[x];
+        let known = (expected > 0.0) & (energy[x].max(f32::MIN_POSITIVE) > 0.5 * expected);
+        variances[x] = if known { variances[x] } else { f32::INFINITY };
+    }
+}
+
+/// Roots of a vector of columns, and the variance of each for noise of unit variance.
+#[inline(always)]
+fn root_columns<L: Lanes>(given: [&[f32]; 6], of_noise: OfNoise, alpha: &mut [f32], variance: &mut [f32]) {
+    let [c0, c1, c2, c3, energy, noise] = given;
+    assert!(c0.len() >= L::N && c1.len() >= L::N && c2.len() >= L::N && c3.len() >= L::N);
+    assert!(energy.len() >= L::N && noise.len() >= L::N && alpha.len() >= L::N && variance.len() >= L::N);
+    // SAFETY: the lengths above.
+    let [c0, c1, c2, c3, energy, noise] = unsafe {
+        [
+            L::load(c0.as_ptr()),
+            L::load(c1.as_ptr()),
+            L::load(c2.as_ptr()),
+            L::load(c3.as_ptr()),
+            L::load(energy.as_ptr()),
+            L::load(noise.as_ptr()),
+        ]
+    };
+    let [lowest, highest] = [L::splat(-LARGEST_ALPHA), L::splat(LARGEST_ALPHA)];
+    // In constant regions rounding leaves energies of 0 or below.
+    let energy = energy.max(L::splat(f32::MIN_POSITIVE));
+    let expected = noise.mul(L::splat(of_noise.energy));
+    let evidence = energy.sub(expected).max(energy.mul(L::splat(of_noise.least_evidence)));
+    let least = evidence.mul(L::splat(of_noise.least_slope)).max(L::splat(LEAST_SLOPE));
+    let c1 = noise.neg_mul_add(L::splat(of_noise.c1), c1).max(least);
+    let c3 = noise.neg_mul_add(L::splat(of_noise.c3), c3);
+    let least = c1.mul(L::splat(SLOPE_FLOOR));
+    let (three_c3, two_c2) = (c3.mul(L::splat(3.0)), c2.add(c2));
+    let mut inverse = c1.reciprocal();
+    let mut root = c0.neg_mul_add(inverse, L::splat(0.0)).max(lowest).min(highest);
+    for _ in 0..STEPS {
+        let value = c3.mul_add(root, c2).mul_add(root, c1).mul_add(root, c0);
+        let slope = three_c3.mul_add(root, two_c2).mul_add(root, c1).max(least);
+        inverse = slope.reciprocal();
+        root = value.neg_mul_add(inverse, root).max(lowest).min(highest);
+    }
+    // SAFETY: the lengths above.
+    unsafe {
+        root.store(alpha.as_mut_ptr());
+        energy.mul(inverse).mul(inverse).store(variance.as_mut_ptr());
     }
 }
 
@@ -419,6 +472,12 @@ mod tests {
                 let slope = 2.0 + 0.2 * wanted + 0.6 * wanted * wanted;
                 assert!((variance * slope * slope - 1.0).abs() < 1e-2);
             }
+            let nothing = vec![0.0; n];
+            let sums = CubicSums { c: [&nothing; 4].map(|c| &c[..]), energy: &nothing, noise: &noise };
+            roots(backend, sums, of_noise, Found { alpha: &mut alpha, variance: &mut variance });
+            assert!(
+                alpha.iter().all(|alpha| alpha.is_finite()) && variance.iter().all(|v| *v == f32::INFINITY)
+            );
         }
     }
 }

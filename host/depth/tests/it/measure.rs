@@ -1,6 +1,8 @@
 //! Pairs of an ordinary camera: alignment, brightness, validity.
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
+use std::sync::LazyLock;
+
 use crate::common::rig;
 use farnear_depth::adaptive_window::Window;
 use farnear_depth::measure::{
@@ -17,6 +19,7 @@ use ndarray::{Array2, s};
 const SIZE: (usize, usize) = (320, 240);
 pub const PSF: &str = "gaussian:k=0.4578";
 
+#[derive(Clone)]
 struct Pair {
     far: Array2<f32>,
     near: Array2<f32>,
@@ -43,6 +46,9 @@ fn pair(scene: &str, psf: &str, noise: Noise, lens: &Lens, view: View, seed: u64
 fn plain(scene: &str, seed: u64) -> Pair {
     pair(scene, PSF, Noise::EightBit, &lens(), View::default(), seed)
 }
+
+/// The pair that most tests take.
+static STAIRCASE: LazyLock<Pair> = LazyLock::new(|| plain("staircase", 1));
 
 /// A pair `[far, near]` of 8 bits.
 pub fn rendered(scene: &str, view: View, seed: u64) -> [Array2<f32>; 2] {
@@ -165,7 +171,7 @@ fn a_good_pair_goes_through_untouched() {
 
 #[test]
 fn a_confidence_that_nothing_reaches_is_reported() {
-    let pair = plain("staircase", 1);
+    let pair = &*STAIRCASE;
     let optics = rig(PSF);
     let lost = |least_confidence: f32| {
         let settings = MeasureSettings { least_confidence, ..settings(Window::Fixed(7)) };
@@ -188,6 +194,8 @@ fn geometry_and_brightness_are_corrected() {
         magnification,
         rotation_deg,
     };
+    let before = plain("staircase", 7);
+    let (undisturbed, _) = error(&measure(&before, PSF, Window::Fixed(7)).unwrap().map.depth_mm, &before);
     for (gain, view) in [
         (1.0, view(0.25, 1.0, 0.0)),
         (1.2, view(0.0, 1.0, 0.0)),
@@ -201,10 +209,7 @@ fn geometry_and_brightness_are_corrected() {
         pair.near *= gain;
         let found = measure(&pair, PSF, Window::Fixed(7)).unwrap();
         let adaptive = measure(&pair, PSF, Window::Adaptive).unwrap();
-        let before = plain("staircase", 7);
-        let undisturbed = measure(&before, PSF, Window::Fixed(7)).unwrap();
-        let [(mm, valid), (undisturbed, _)] =
-            [(&found, &pair), (&undisturbed, &before)].map(|(f, p)| error(&f.map.depth_mm, p));
+        let (mm, valid) = error(&found.map.depth_mm, &pair);
         println!(
             "{gain} {view:?}: {mm:.3} (undisturbed {undisturbed:.3}, adaptive {:?}), valid {valid:.3}, {:?}",
             error(&adaptive.map.depth_mm, &pair),
@@ -242,7 +247,7 @@ fn a_lens_that_is_not_telecentric_is_noticed() {
 
 #[test]
 fn different_scenes_are_refused() {
-    let (one, other) = (plain("staircase", 1), plain("staircase", 2));
+    let (one, other) = (STAIRCASE.clone(), plain("staircase", 2));
     let mixed = Pair { near: other.near, ..one };
     let refused = measure(&mixed, PSF, Window::Fixed(7)).unwrap_err();
     assert!(
@@ -253,7 +258,7 @@ fn different_scenes_are_refused() {
 
 #[test]
 fn an_image_is_no_pair_with_itself() {
-    let mut twice = plain("staircase", 1);
+    let mut twice = STAIRCASE.clone();
     // A transparent pixel is alike a transparent one.
     twice.far[(20, 30)] = f32::NAN;
     twice.near.assign(&twice.far);
@@ -264,7 +269,7 @@ fn an_image_is_no_pair_with_itself() {
 
 #[test]
 fn a_mirrored_turned_or_inverted_image_is_named() {
-    let Pair { far, near, truth } = plain("staircase", 1);
+    let Pair { far, near, truth } = STAIRCASE.clone();
     for (changed, words) in [
         (near.slice(s![.., ..;-1]).to_owned(), "mirrored left to right"),
         (near.slice(s![..;-1, ..]).to_owned(), "mirrored top to bottom"),

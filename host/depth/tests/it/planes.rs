@@ -55,10 +55,11 @@ fn planes_are_flat_and_where_they_are() {
 fn noise_draws_no_weak_texture_to_the_middle() {
     for (seed, plane_mm) in [(1, 892.0), (2, 928.0)] {
         let scene = format!("plane:{plane_mm},texture=fractal,contrast=0.05");
+        let pair = rendered(&scene, View::default(), seed);
         for window in [Window::Adaptive, Window::Fixed(41)] {
             let settings = MeasureSettings { window, ..MeasureSettings::default() };
-            let pair = rendered(&scene, View::default(), seed);
-            let found = measure_pair(pair, &rig(PSF), DepthMethod::Whitened, None, &settings).unwrap();
+            let found =
+                measure_pair(pair.clone(), &rig(PSF), DepthMethod::Whitened, None, &settings).unwrap();
             let deviations = found.validity.deviation_mm.iter();
             let errors: Vec<(f64, f64)> = std::iter::zip(&found.map.depth_mm, deviations)
                 .map(|(depth, deviation)| (f64::from(*depth) - plane_mm, f64::from(*deviation)))

@@ -1,11 +1,11 @@
 //! A wave-optics lens, which no model of this crate contains, calibrated by its z-stack and tested on other scenes.
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
-use std::f64::consts::PI;
+use std::{f64::consts::PI, sync::OnceLock};
 
 use crate::common::eight_bit;
 use farnear_depth::adaptive_window::Window;
-use farnear_depth::calibrate::stack::{Moved, StackError, StackLens, StackSettings, calibrate_stack};
+use farnear_depth::calibrate::stack::{Moved, StackLens, StackSettings, calibrate_stack};
 use farnear_depth::measure::{DepthMethod, MeasureSettings, measure_pair};
 use farnear_depth::pipeline::Settings;
 use farnear_scene::wave::{WaveLens, random_texture};
@@ -56,7 +56,23 @@ fn best_um(lens: &WaveLens) -> f64 {
 
 const TARGET: Plane = Plane([7.1, 0.7, -0.3]);
 
+/// Stacks and calibrations that several tests take, made once: they take most of the time.
+static STACKS: [OnceLock<Vec<Array2<f32>>>; 2] = [const { OnceLock::new() }; 2];
+static CALIBRATED: [OnceLock<StackLens>; 2] = [const { OnceLock::new() }; 2];
+
+/// The index of a shared lens: without aberration, or with one wave of spherical aberration.
+fn shared(taken: &WaveLens) -> Option<usize> {
+    [0.0, 1.0].into_iter().position(|spherical_waves| *taken == lens(spherical_waves, 0.0))
+}
+
 fn stack(lens: &WaveLens) -> Vec<Array2<f32>> {
+    match shared(lens) {
+        Some(index) => STACKS[index].get_or_init(|| drawn(lens)).clone(),
+        None => drawn(lens),
+    }
+}
+
+fn drawn(lens: &WaveLens) -> Vec<Array2<f32>> {
     let cells = random_texture(true, SIZE[0], SIZE[1], CONTRAST, 11);
     (0..SLICES).map(|index| slice(lens, &cells, &|y, x| TARGET.at(y, x), index, 1)).collect()
 }
@@ -66,8 +82,12 @@ fn settings() -> StackSettings {
     StackSettings { step_mm: STEP_MM, moved, pair_step: None, bin: None, coding: 0.0 }
 }
 
-fn calibrated(lens: &WaveLens) -> Result<StackLens, StackError> {
-    calibrate_stack(&stack(lens), &settings(), &|_| true)
+fn calibrated(lens: &WaveLens) -> StackLens {
+    let calibrate = || calibrate_stack(&stack(lens), &settings(), &|_| true).unwrap();
+    match shared(lens) {
+        Some(index) => CALIBRATED[index].get_or_init(calibrate).clone(),
+        None => calibrate(),
+    }
 }
 
 /// A factor on a whole slice changes neither the plane of best focus nor depth: flicker, one bright slice, two exposures.
@@ -233,7 +253,7 @@ fn judged(lens: &WaveLens, found: &StackLens, scene: Surface) -> Judged {
 fn a_curved_surface_is_measured_honestly_by_a_lens_learned_on_a_flat_one() {
     for (spherical_waves, largest_tolerance, fill) in [(0.0, 0.0, 0.95), (1.0, 0.02, 0.5)] {
         let lens = lens(spherical_waves, 0.0);
-        let found = calibrated(&lens).unwrap();
+        let found = calibrated(&lens);
         // In units of true depth it is 0.038, with which the largest window is taken everywhere.
         let tolerance = found.optics.stage().unwrap().window_tolerance;
         assert!(tolerance <= largest_tolerance, "{tolerance}");
@@ -247,7 +267,7 @@ fn a_curved_surface_is_measured_honestly_by_a_lens_learned_on_a_flat_one() {
 #[test]
 fn a_slope_reaches_to_the_border() {
     let lens = lens(0.0, 0.0);
-    let found = calibrated(&lens).unwrap();
+    let found = calibrated(&lens);
     let step = found.optics.stage().unwrap().pair_step;
     let plane = Plane([4.0 + 0.5 * step as f64, 0.7 * step as f64, 0.0]);
     let cells = random_texture(true, SIZE[0], SIZE[1], CONTRAST, 50);
@@ -289,7 +309,7 @@ fn a_lens_by_wave_optics_is_calibrated_by_its_stack_and_measures_other_scenes_ho
     }
     for (spherical, astigmatism, largest) in lenses {
         let lens = lens(spherical, astigmatism);
-        let found = calibrated(&lens).unwrap();
+        let found = calibrated(&lens);
         println!(
             "spherical {spherical}, astigmatism {astigmatism}: {} blur {:.2} px, step {}, {:.4?}",
             found.optics.psf(),

@@ -100,7 +100,8 @@ fn normalised_ratio(page: &mut Page) -> Result<()> {
             vertical: Some([-1.25, 1.25]),
         });
         let bend = first_non_monotonic(&otf, blur_px);
-        let bend = if bend.is_finite() { format!("{bend:.3}") } else { "never".into() };
+        // `first_non_monotonic` is exact to 1 %.
+        let bend = if bend.is_finite() { format!("{bend:.2}") } else { "never".into() };
         rows.push(vec![name.into(), bend]);
     }
     page.picture(

@@ -62,12 +62,10 @@ fn errors_of_the_simulator_are_forwarded() {
     fails(farnear(&["rig", "info", "--port", "sim"]).args(["--firmware", "none.elf"]), 1, &messages);
 }
 
-fn capture(folder: &Folder, faults: Option<&str>, out: &str) -> Assert {
+fn capture(folder: &Folder, faults: &str, out: &str) -> Assert {
     let mut command = farnear(&["rig", "capture", "--port", "sim", "--optics", rig_optics()]);
-    command.args(["--out", &folder.text(out)]);
-    if let Some(faults) = faults {
-        command.args(["--faults", &folder.file("faults.toml", faults)]);
-    }
+    let faults = format!("start_um = [60.0, 80.0]\n{faults}\n");
+    command.args(["--out", &folder.text(out), "--faults", &folder.file("faults.toml", faults)]);
     command
 }
 
@@ -120,19 +118,19 @@ fn a_simulator_that_is_killed_ends_the_capture_without_a_trace() {
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn a_bad_line_changes_nothing_or_fails_cleanly() {
     let folder = Folder::new();
-    succeeds(&mut capture(&folder, None, "clean"));
+    succeeds(&mut capture(&folder, "", "clean"));
     let images = |name: &str| {
         ["far.png", "near.png"]
             .map(|file| fs::read(folder.path(&format!("{name}/{file}"))).expect("an image"))
     };
     // A foreign frame, half a frame, delimiters: as from a terminal that was left open.
-    succeeds(&mut capture(&folder, Some("garbage = [3, 255, 0, 66, 17, 0, 0, 9]"), "garbage"));
+    succeeds(&mut capture(&folder, "garbage = [3, 255, 0, 66, 17, 0, 0, 9]", "garbage"));
     assert!(images("clean") == images("garbage"));
     let record = |name: &str| fs::read(folder.path(&format!("{name}/capture.toml"))).expect("a record");
     assert!(record("clean") == record("garbage"));
 
     let before = folder.listing();
-    let output = capture(&folder, Some("bit_error_rate = 1e-4"), "noisy").output().expect("it starts");
+    let output = capture(&folder, "bit_error_rate = 1e-4", "noisy").output().expect("it starts");
     let messages = String::from_utf8_lossy(&output.stderr);
     match output.status.code() {
         Some(0) => {

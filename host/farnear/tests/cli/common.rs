@@ -2,7 +2,10 @@
 
 use std::{
     fs,
+    io::{BufRead, BufReader},
     path::{Path, PathBuf},
+    process::{self, Child, Stdio},
+    sync::LazyLock,
 };
 
 use assert_cmd::Command;
@@ -15,11 +18,70 @@ pub fn farnear(arguments: &[&str]) -> Command {
     command
 }
 
-/// A command of the emulated rig.
+/// A command of an emulated rig that is started for it, with the stages near their home switches.
 pub fn on_the_rig(arguments: &[&str]) -> Command {
     let mut command = farnear(&["rig"]);
-    command.args(arguments).args(["--port", "sim"]);
+    command.args(arguments).args(["--port", "sim", "--faults", NEAR_HOME]);
     command
+}
+
+/// A file of `--faults`: homing takes less time.
+pub const NEAR_HOME: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/cli/near-home.toml");
+
+/// An emulated rig for several commands, because each start of one translates the firmware again.
+pub struct SharedRig {
+    child: Child,
+    port: String,
+    camera: String,
+}
+
+impl SharedRig {
+    /// `faults` is a file of `--faults`.
+    pub fn start(faults: &str) -> Self {
+        let mut child = process::Command::new(built(SIM))
+            .args(["run", "--tcp", "--faults", faults])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("farnear-sim starts");
+        let mut line = String::new();
+        let output = child.stdout.take().expect("its output");
+        BufReader::new(output).read_line(&mut line).expect("text");
+        let address: Value = serde_json::from_str(&line).expect("one line of JSON");
+        let text = |key: &str| address[key].as_str().expect("an address").to_owned();
+        Self { child, port: text("port"), camera: text("camera") }
+    }
+
+    /// A command that takes no picture.
+    pub fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = farnear(&["rig"]);
+        command.args(arguments).args(["--port", &self.port]);
+        command
+    }
+
+    pub fn with_camera(&self, arguments: &[&str]) -> Command {
+        let mut command = self.command(arguments);
+        command.args(["--camera", &self.camera]);
+        command
+    }
+}
+
+impl Drop for SharedRig {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// True depths of the emulated rig's usual scene with [`rig_optics`], rendered once.
+pub fn true_staircase() -> &'static str {
+    static TRUTH: LazyLock<String> = LazyLock::new(|| {
+        let out = concat!(env!("CARGO_TARGET_TMPDIR"), "/staircase");
+        let _ = fs::remove_dir_all(out); // of an earlier run
+        succeeds(&mut farnear(&["render", "--optics", rig_optics(), "--out", out]));
+        format!("{out}/truth.npy")
+    });
+    &TRUTH
 }
 
 /// The optics of the rig in docs/: 933 to 886.81 mm, Gaussian.

@@ -2,26 +2,30 @@
 
 use std::fs;
 
-use crate::common::{Folder, fails, farnear, figures, number, on_the_rig, rig_optics, succeeds};
+use serde_json::Value;
+
+use crate::common::{
+    Folder, NEAR_HOME, SharedRig, fails, farnear, figures, number, on_the_rig, rig_optics, succeeds,
+    true_staircase,
+};
 
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn info_identifies_the_emulated_board() {
-    let mut command = on_the_rig(&["info", "--json"]);
-    let info = figures(&mut command);
+    let (stdout, stderr) = succeeds(&mut on_the_rig(&["info", "--json"]));
+    let info: Value = serde_json::from_str(&stdout).expect("JSON");
     assert_eq!((&info["emulated"], &info["protocol"], &info["boot"]), (&true.into(), &3.into(), &1.into()));
     assert_eq!(info["board"], "nucleo-f429zi");
-    assert_eq!(info["coarse"]["state"], "unknown");
-    let (_, stderr) = succeeds(&mut on_the_rig(&["info"]));
+    assert_eq!((info["coarse"]["state"].as_str(), stdout.lines().count()), (Some("unknown"), 1));
     assert!(stderr.contains("starting the emulated rig") && stderr.contains("no hardware"), "{stderr}");
 }
 
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
-fn a_rig_behind_tcp_gives_a_pair_and_its_depth() {
+fn a_rig_behind_tcp_gives_a_pair_and_its_depth_after_a_capture_on_a_full_disk() {
     let folder = Folder::new();
     let mut sim = std::process::Command::new(assert_cmd::cargo::cargo_bin("farnear-sim"))
-        .args(["run", "--tcp"])
+        .args(["run", "--tcp", "--faults", NEAR_HOME])
         .stdin(std::process::Stdio::piped())
         .stdout(std::process::Stdio::piped())
         .spawn()
@@ -32,43 +36,56 @@ fn a_rig_behind_tcp_gives_a_pair_and_its_depth() {
     let address: serde_json::Value = serde_json::from_str(&line).expect("JSON");
     let [port, camera] = ["port", "camera"].map(|key| address[key].as_str().expect("text"));
     let capture = ["rig", "capture", "--optics", rig_optics(), "--port", port, "--camera", camera];
+    #[cfg(target_os = "linux")]
+    fails_on_a_full_disk(&folder, &capture);
+    // The next capture can use the same name.
     succeeds(farnear(&capture).args(["--out", &folder.text("pair")]));
     drop(sim.stdin.take());
     assert!(sim.wait().expect("it ends").success());
     let [far, near] = ["far.png", "near.png"].map(|file| folder.text(&format!("pair/{file}")));
     succeeds(&mut farnear(&["depth", &far, &near, "--optics", rig_optics(), "--median-px", "5"]));
-    let scene = folder.text("scene");
-    succeeds(&mut farnear(&["render", "--optics", rig_optics(), "--out", &scene]));
-    let (map, truth) = (folder.text("pair/depth.npy"), format!("{scene}/truth.npy"));
-    let compared = figures(&mut farnear(&["compare", &map, &truth, "--away-from-edges", "8", "--json"]));
+    let (map, truth) = (folder.text("pair/depth.npy"), true_staircase());
+    let compared = figures(&mut farnear(&["compare", &map, truth, "--away-from-edges", "8", "--json"]));
     assert!(number(&compared, "rmse_mm") <= 0.75, "{compared}"); // as below
+}
+
+/// The file size limit is 32 kB (64 kB where a shell counts in KiB); an image has some 200 kB.
+#[cfg(target_os = "linux")]
+fn fails_on_a_full_disk(folder: &Folder, capture: &[&str]) {
+    let mut command = assert_cmd::Command::new("sh");
+    command.args(["-c", r#"trap "" XFSZ; ulimit -f 64; exec "$0" "$@""#, env!("CARGO_BIN_EXE_farnear")]);
+    command.args(capture).args(["--out", &folder.text("pair")]);
+    fails(&mut command, 1, &["cannot write", "far.png"]);
+    assert_eq!(folder.listing(), [""; 0]);
 }
 
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn the_stage_homes_moves_and_stops_and_keeps_its_limits() {
-    let homed = figures(&mut on_the_rig(&["home", "--json"]));
-    assert!(homed["shift_um"].is_number() && homed["lens_shift_um"].is_number(), "{homed}");
+    let rig = SharedRig::start(NEAR_HOME);
+    succeeds(&mut rig.command(&["info"]));
     let coarse = ["move", "--axis", "coarse", "--to-um", "123.5"];
-    fails(&mut on_the_rig(&coarse), 1, &["refused", "123.500 um", "home it first"]);
-    let moved = figures(on_the_rig(&coarse).args(["--home", "--json"]));
+    fails(&mut rig.command(&coarse), 1, &["refused", "123.500 um", "home it first"]);
+    let moved = figures(rig.command(&coarse).args(["--home", "--json"]));
     // A step is 0.15625 um; the encoder counts 0.125 um.
     assert!((number(&moved, "measured_um") - 123.5).abs() < 0.3, "{moved}");
     let both = [
         "move", "--home", "--axis", "lens", "--to-um", "400", "--axis", "coarse", "--to-um", "250", "--json",
     ];
-    let moved = figures(&mut on_the_rig(&both));
+    let moved = figures(&mut rig.command(&both));
     for (at, asked) in [(0, 400.0), (1, 250.0)] {
         assert!((number(&moved["moved"][at], "measured_um") - asked).abs() < 0.3, "{moved}");
     }
-    let fine = figures(&mut on_the_rig(&["move", "--axis", "fine", "--to-um", "50", "--json"]));
+    let homed = figures(&mut rig.command(&["home", "--json"]));
+    assert!(homed["shift_um"].is_number() && homed["lens_shift_um"].is_number(), "{homed}");
+    let fine = figures(&mut rig.command(&["move", "--axis", "fine", "--to-um", "50", "--json"]));
     assert!((number(&fine, "measured_um") - 50.0).abs() <= 0.05, "{fine}");
     let again = ["home", "--axis", "lens", "--axis", "lens"];
     fails(&mut on_the_rig(&again), 2, &["axis lens", "each axis once"]);
     let beyond = ["move", "--axis", "fine", "--to-um", "500"];
-    fails(&mut on_the_rig(&beyond), 1, &["outside the limits", "500.000 um", "5.000 to 195.000 um"]);
+    fails(&mut rig.command(&beyond), 1, &["outside the limits", "500.000 um", "5.000 to 195.000 um"]);
     let below = ["move", "--axis", "fine", "--to-um", "-1"];
-    fails(&mut on_the_rig(&below), 1, &["-1.000 um", "5.000 to 195.000 um"]);
+    fails(&mut rig.command(&below), 1, &["-1.000 um", "5.000 to 195.000 um"]);
     fails(
         &mut on_the_rig(&["move", "--axis", "fine", "--to-um", "1e9"]),
         2,
@@ -132,28 +149,10 @@ fn two_captures_with_one_seed_are_the_same_to_the_byte_and_give_the_depth() {
     let again = ["capture", "--optics", rig_optics(), "--out", &folder.text("a")];
     fails(&mut on_the_rig(&again), 1, &["exists already and is not an empty folder"]);
 
-    let scene = folder.text("scene");
-    succeeds(&mut farnear(&["render", "--optics", rig_optics(), "--out", &scene]));
-    let (map, truth) = (folder.text("a/depth.npy"), format!("{scene}/truth.npy"));
-    let compared = figures(&mut farnear(&["compare", &map, &truth, "--away-from-edges", "8", "--json"]));
+    let (map, truth) = (folder.text("a/depth.npy"), true_staircase());
+    let compared = figures(&mut farnear(&["compare", &map, truth, "--away-from-edges", "8", "--json"]));
     // The project's promise for the noisy 8-bit staircase.
     assert!(number(&compared, "rmse_mm") <= 0.75, "{compared}");
-}
-
-/// The file size limit is 32 kB (64 kB where a shell counts in KiB); an image has some 200 kB.
-#[test]
-#[cfg(target_os = "linux")]
-#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
-fn a_capture_on_a_full_disk_fails_and_leaves_no_files() {
-    let folder = Folder::new();
-    let pair = folder.text("pair");
-    let mut command = assert_cmd::Command::new("sh");
-    command.args(["-c", r#"trap "" XFSZ; ulimit -f 64; exec "$0" "$@""#, env!("CARGO_BIN_EXE_farnear")]);
-    command.args(["rig", "capture", "--port", "sim", "--optics", rig_optics(), "--out", &pair]);
-    fails(&mut command, 1, &["cannot write", "far.png"]);
-    assert_eq!(folder.listing(), [""; 0]);
-    // The next capture can use the same name.
-    succeeds(&mut on_the_rig(&["capture", "--optics", rig_optics(), "--out", &pair]));
 }
 
 #[test]

@@ -5,7 +5,9 @@ use std::{fs, path::Path};
 use farnear_files::{image_file::read_grey, map, npy};
 use ndarray::Array2;
 
-use crate::common::{Folder, fails, farnear, figures, number, on_the_rig, rig_optics, succeeds};
+use crate::common::{
+    Folder, NEAR_HOME, SharedRig, fails, farnear, figures, number, on_the_rig, rig_optics, succeeds,
+};
 
 /// True sensor position at the end of a trace, in mm from the lens.
 fn true_sensor_mm(trace: &str) -> f64 {
@@ -53,12 +55,12 @@ fn a_focus_beyond_the_range_is_not_found_at_its_end() {
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn a_stack_and_a_program_leave_their_images_and_what_was_measured() {
-    let folder = Folder::new();
+    let (folder, rig) = (Folder::new(), SharedRig::start(NEAR_HOME));
     // Near the focus: the simulator takes long to draw strong blur.
     let out = folder.text("stack");
     let stack =
         ["sequence", "--axis", "coarse", "--from", "5790", "--to", "5830", "--steps", "3", "--out", &out];
-    let found = figures(on_the_rig(&stack).args(["--optics", rig_optics(), "--json"]));
+    let found = figures(rig.with_camera(&stack).args(["--optics", rig_optics(), "--json"]));
     assert_eq!(number(&found, "exposures"), 3.0);
     assert!(number(&found, "largest_error_um") <= 1.0, "{found}");
     assert_eq!(folder.listing().iter().filter(|name| name.ends_with(".png")).count(), 3);
@@ -74,10 +76,10 @@ fn a_stack_and_a_program_leave_their_images_and_what_was_measured() {
                    [[shot]]\naxis = \"fine\"\nto_um = 20.0\n";
     let (file, out) = (folder.file("program.toml", program), folder.text("program"));
     let run = ["sequence", "--program", &file, "--runs", "2", "--out", &out, "--json"];
-    assert_eq!(number(&figures(&mut on_the_rig(&run)), "exposures"), 8.0);
+    assert_eq!(number(&figures(&mut rig.with_camera(&run)), "exposures"), 8.0);
     let bad = folder.file("bad.toml", "[[shot]]\naxis = \"fine\"\nto_um = 300.0\n");
     let run = ["sequence", "--program", &bad, "--out", &folder.text("bad")];
-    fails(&mut on_the_rig(&run), 1, &["outside the limits", "300.000 um", "195.000 um"]);
+    fails(&mut rig.with_camera(&run), 1, &["outside the limits", "300.000 um", "195.000 um"]);
     assert!(!folder.path("bad").exists());
 }
 
@@ -110,11 +112,11 @@ fn a_map_before_the_emulated_camera_is_seen_as_the_plane_that_it_is() {
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn a_continuous_capture_leaves_pairs_and_a_row_for_each_frame() {
-    let folder = Folder::new();
+    let (folder, rig) = (Folder::new(), SharedRig::start(NEAR_HOME));
     let out = folder.text("run");
     let run =
         ["continuous", "--optics", rig_optics(), "--rate", "40", "--frames", "7", "--out", &out, "--json"];
-    let found = figures(&mut on_the_rig(&run));
+    let found = figures(&mut rig.with_camera(&run));
     assert_eq!((number(&found, "exposures"), number(&found, "cycles")), (7.0, 3.0), "{found}");
     assert_eq!((number(&found, "jitter_us"), number(&found, "rate_hz")), (0.0, 40.0), "{found}");
     assert_eq!(number(&found, "exposures_outside_window"), 0.0, "{found}");
@@ -128,7 +130,7 @@ fn a_continuous_capture_leaves_pairs_and_a_row_for_each_frame() {
     // A rate above the camera's is refused with the highest possible one.
     let out = folder.text("refused");
     let run = ["continuous", "--optics", rig_optics(), "--rate", "100", "--frames", "7", "--out", &out];
-    fails(&mut on_the_rig(&run), 1, &["refused", "15500 us"]);
+    fails(&mut rig.with_camera(&run), 1, &["refused", "15500 us"]);
     assert!(!folder.path("refused").exists());
 }
 
@@ -153,7 +155,7 @@ fn flat_targets_are_captured_listed_and_not_captured_twice() {
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn the_board_corrects_and_fits_with_the_hosts_bits() {
-    let folder = Folder::new();
+    let (folder, rig) = (Folder::new(), SharedRig::start(NEAR_HOME));
     let mut list = String::new();
     for (number, true_mm) in [890.0, 900.0, 910.0, 920.0, 930.0].into_iter().enumerate() {
         // A bowl whose height depends on the depth.
@@ -166,28 +168,29 @@ fn the_board_corrects_and_fits_with_the_hosts_bits() {
     }
     let (list, correction) = (folder.file("PATTERNS.toml", list), folder.text("correction.toml"));
     let fitted = ["calibrate", "fit", &list, "--method", "clsf", "--step", "1", "--store", "--json"];
-    let fitted = figures(&mut on_the_rig(&fitted));
+    let fitted = figures(&mut rig.command(&fitted));
     assert_eq!((number(&fitted, "coefficients"), number(&fitted, "different")), (90.0, 0.0));
     for method in ["clsf-blend", "clsf-full"] {
         let learn = ["calibrate", "correction", &list, "--method", method, "--out", &correction];
         succeeds(&mut farnear(&learn));
         let (map, out) = (folder.text("4.npy"), folder.text("corrected.npy"));
         let correct = ["correct", &map, "--correction", &correction, "--out", &out, "--json"];
-        let corrected = figures(&mut on_the_rig(&correct));
+        let corrected = figures(&mut rig.command(&correct));
         assert_eq!((&corrected["method"], number(&corrected, "different_pixels")), (&method.into(), 0.0));
     }
     let sun = ["sun", "--lat", "52.38", "--lon=-1.56", "--time", "2012-07-17T12:00:00Z", "--azimuth", "135"];
-    assert_eq!(figures(on_the_rig(&sun).arg("--json"))["same_bits"], true);
+    assert_eq!(figures(rig.command(&sun).arg("--json"))["same_bits"], true);
 }
 
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn the_checklist_passes_and_the_mechanics_are_measured() {
-    let checked = figures(&mut on_the_rig(&["check", "--json"]));
+    let rig = SharedRig::start(NEAR_HOME);
+    let checked = figures(&mut rig.with_camera(&["check", "--json"]));
     assert_eq!((number(&checked, "failed"), number(&checked, "passed")), (0.0, 12.0), "{checked}");
     // The plant's screw has 4 um of backlash.
     let backlash = ["calibrate", "backlash", "--axis", "coarse", "--json"];
-    let backlash = figures(&mut on_the_rig(&backlash));
+    let backlash = figures(&mut rig.command(&backlash));
     assert!((number(&backlash, "backlash_um") - 4.0).abs() < 1.0, "{backlash}");
 }
 

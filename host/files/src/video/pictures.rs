@@ -42,10 +42,16 @@ pub fn list(folder: &Path) -> Result<Vec<PathBuf>, VideoError> {
     Ok(paths)
 }
 
-/// Hidden files, and those that other systems leave: `._name.png` next to `name.png`, `Thumbs.db`.
-pub(crate) fn hidden(path: &Path) -> bool {
+/// Hidden files, and [`left_by_system`].
+pub fn hidden(path: &Path) -> bool {
+    path.file_name().unwrap_or_default().to_string_lossy().starts_with('.') || left_by_system(path)
+}
+
+/// Files that macOS and Windows add to folders: `.DS_Store`, `._name.png` next to `name.png`, `Thumbs.db`.
+pub fn left_by_system(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    name.starts_with('.') || name.eq_ignore_ascii_case("Thumbs.db")
+    let by_windows = ["Thumbs.db", "desktop.ini"].iter().any(|left| name.eq_ignore_ascii_case(left));
+    name == ".DS_Store" || name.starts_with("._") || by_windows
 }
 
 pub(super) fn open(

@@ -1,10 +1,6 @@
 //! Reads the masks of a view from a folder or a video.
 
-use std::{
-    fmt,
-    path::{Path, PathBuf},
-    str::FromStr,
-};
+use std::path::{Path, PathBuf};
 
 use farnear_files::{
     masks::{
@@ -29,26 +25,7 @@ pub enum ViewKind {
     Video,
 }
 
-impl fmt::Display for ViewKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Masks => "masks",
-            Self::Video => "video",
-        })
-    }
-}
-
-impl FromStr for ViewKind {
-    type Err = String;
-
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
-        match text {
-            "masks" => Ok(Self::Masks),
-            "video" => Ok(Self::Video),
-            other => Err(format!("`{other}` is not a kind of view: expected masks or video")),
-        }
-    }
-}
+farnear_silhouettes::named!(ViewKind, "kind of view", "masks" => Masks, "video" => Video);
 
 impl ViewKind {
     /// Guesses the kind from the grey levels. Masks have two levels, or labels of a background model.

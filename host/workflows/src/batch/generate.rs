@@ -2,11 +2,11 @@
 
 use std::{
     fs,
-    path::{Path, PathBuf},
+    path::{Component, Path, PathBuf},
     str::FromStr,
 };
 
-use farnear_files::staging::write_file;
+use farnear_files::{staging::write_file, video::pictures::left_by_system};
 
 use super::{BatchError, fields::Fields, jobs, manifest::KIND};
 use crate::error::Result;
@@ -62,13 +62,8 @@ pub fn generate(manifest: &Path, kind: &str, fields: &[Pattern]) -> Result<usize
     }
     let base = manifest.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut found = Vec::new();
-    let parts: Vec<&str> = first.value.split('/').collect();
-    search(
-        if first.value.starts_with('/') { Path::new("/") } else { base },
-        &parts,
-        &mut Vec::new(),
-        &mut found,
-    );
+    let (root, parts) = split(&first.value);
+    search(&base.join(root), &parts, &mut Vec::new(), &mut found);
     found.sort();
     if found.is_empty() {
         return Err(
@@ -112,8 +107,21 @@ fn filled(value: &str, captured: &[String]) -> String {
     text
 }
 
+/// Root and parts of a pattern, as the system separates them: `C:\shots\*` on Windows.
+fn split(pattern: &str) -> (PathBuf, Vec<String>) {
+    let (mut root, mut parts) = (PathBuf::new(), Vec::new());
+    for part in Path::new(pattern).components() {
+        match part {
+            Component::Prefix(_) | Component::RootDir => root.push(part),
+            Component::CurDir => {}
+            part => parts.push(part.as_os_str().to_string_lossy().into_owned()),
+        }
+    }
+    (root, parts)
+}
+
 /// Texts matched by the `*` of each part of a path, for each file below `folder`.
-fn search(folder: &Path, parts: &[&str], captured: &mut Vec<String>, found: &mut Vec<Vec<String>>) {
+fn search(folder: &Path, parts: &[String], captured: &mut Vec<String>, found: &mut Vec<Vec<String>>) {
     let Some((part, rest)) = parts.split_first() else { return };
     if !part.contains('*') {
         let path = folder.join(part);
@@ -127,7 +135,7 @@ fn search(folder: &Path, parts: &[&str], captured: &mut Vec<String>, found: &mut
     for entry in entries.flatten() {
         let name = entry.file_name().to_string_lossy().into_owned();
         let Some(stars) = matched(part, &name) else { continue };
-        if name.starts_with('.') && !part.starts_with('.') {
+        if left_by_system(&entry.path()) || name.starts_with('.') && !part.starts_with('.') {
             continue;
         }
         let before = captured.len();
@@ -155,6 +163,20 @@ fn matched(pattern: &str, name: &str) -> Option<Vec<String>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_pattern_is_split_into_root_and_parts() {
+        let split = |pattern: &str| {
+            let (root, parts) = split(pattern);
+            (root.display().to_string(), parts.join(" "))
+        };
+        assert_eq!(split("./shots/*/far.png"), (String::new(), "shots * far.png".into()));
+        if cfg!(windows) {
+            assert_eq!(split(r"C:\shots\*\far.png"), (r"C:\".into(), "shots * far.png".into()));
+        } else {
+            assert_eq!(split("/shots/../*.png"), ("/".into(), "shots .. *.png".into()));
+        }
+    }
 
     #[test]
     fn a_manifest_is_written_from_a_pattern() {

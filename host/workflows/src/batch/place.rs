@@ -8,7 +8,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use farnear_files::staging::{PARTIAL, Unfinished, uninterrupted};
+use farnear_files::staging::{PARTIAL, Unfinished, remove_file, rename, uninterrupted};
 use serde_json::Value;
 
 use super::{BatchError, provenance::Provenance};
@@ -17,6 +17,8 @@ use crate::{error::Result, inputs};
 /// Provenance in a result folder; suffix of the provenance of a result file.
 pub(crate) const RECORD: &str = "batch.toml";
 const ASIDE: &str = ".batch-partial";
+/// File in the temporary folder, locked where folders cannot be opened.
+const LOCK: &str = ".batch-lock";
 
 /// The final folder of a result, if `out` is a batch's temporary place.
 pub(crate) fn final_place(out: &Path) -> PathBuf {
@@ -119,7 +121,7 @@ impl Place {
     fn remove(&self, name: &Path) -> io::Result<()> {
         let file = self.root().join(name);
         if file.exists() {
-            fs::remove_file(&file)?;
+            remove_file(&file)?;
             let folders = file.ancestors().skip(1).take_while(|folder| folder.starts_with(&self.target));
             folders.map(fs::remove_dir).take_while(io::Result::is_ok).for_each(drop);
         }
@@ -144,7 +146,7 @@ impl Place {
             Err(error) if error.kind() != io::ErrorKind::AlreadyExists => return Err(unwritable(error)),
             _ => {}
         }
-        let lock = File::open(aside).map_err(unwritable)?;
+        let lock = lockable(aside, File::open(aside)).map_err(unwritable)?;
         match lock.try_lock() {
             Err(fs::TryLockError::WouldBlock) => Err(BatchError::InUse { path: self.target.clone() }),
             // Continue on systems that cannot lock folders.
@@ -162,7 +164,7 @@ impl Place {
     ) -> io::Result<()> {
         if !self.is_file && !self.target.exists() {
             fs::write(made.join(RECORD), finished)?;
-            return fs::rename(made, &self.target);
+            return rename(made, &self.target);
         }
         let (from, files) = if self.is_file {
             (made.parent().unwrap_or(Path::new("")), vec![made.to_path_buf()])
@@ -173,7 +175,7 @@ impl Place {
         let waiting = made.with_added_extension(RECORD);
         let write = |record: String| {
             fs::write(&waiting, record)?;
-            fs::rename(&waiting, self.record())
+            rename(&waiting, &self.record())
         };
         write(unfinished)?;
         let stale = earlier.into_iter().flat_map(Provenance::outputs);
@@ -183,7 +185,7 @@ impl Place {
             if let Some(folder) = place.parent() {
                 fs::create_dir_all(folder)?;
             }
-            fs::rename(from.join(name), place)?;
+            rename(&from.join(name), &place)?;
         }
         write(finished)
     }
@@ -204,10 +206,19 @@ impl Place {
     }
 }
 
+/// The opened folder, or a file in it where the system does not open folders, as Windows.
+fn lockable(folder: &Path, opened: io::Result<File>) -> io::Result<File> {
+    opened.or_else(|_| File::options().read(true).append(true).create(true).open(folder.join(LOCK)))
+}
+
+/// Removes all files but the lock, which another run tries.
 fn clear(folder: &Path) -> io::Result<()> {
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();
-        if path.is_dir() { fs::remove_dir_all(path)? } else { fs::remove_file(path)? }
+        if path.ends_with(LOCK) {
+            continue;
+        }
+        if path.is_dir() { fs::remove_dir_all(path)? } else { remove_file(&path)? }
     }
     Ok(())
 }
@@ -302,6 +313,21 @@ mod tests {
         fs::remove_dir(target.join("b")).expect("an empty folder");
         place.discard().expect("the rest is removed");
         assert_eq!(listing(root.path()), Vec::<String>::new());
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_opened_is_locked_by_a_file_in_it() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let on_windows = || Err(io::ErrorKind::PermissionDenied.into());
+        let locked = || lockable(folder.path(), on_windows()).expect("a file");
+        let held = locked();
+        held.try_lock().expect("it is free");
+        fs::write(folder.path().join("half"), "1").expect("a writable folder");
+        clear(folder.path()).expect("a writable folder");
+        assert_eq!(listing(folder.path()), [LOCK]);
+        assert!(matches!(locked().try_lock(), Err(fs::TryLockError::WouldBlock)));
+        drop(held);
+        assert!(locked().try_lock().is_ok());
     }
 
     #[test]

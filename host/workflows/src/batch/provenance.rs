@@ -60,8 +60,9 @@ impl Sums {
     ) -> Result<Vec<HashedFile>> {
         let files = inputs::files(paths, is_result)?;
         let sum = |file: &PathBuf| {
-            // Relative to the manifest, so that the whole can be moved.
+            // Relative to the manifest and with `/`, so that the whole can be moved, also to another system.
             let name = file.strip_prefix(base).unwrap_or(file).display().to_string();
+            let name = name.replace(std::path::MAIN_SEPARATOR, "/");
             let summed = self.0.get(FileVersion::of("the input", file)?, || inputs::hash(file, &name))?;
             Ok(HashedFile { file: name, ..HashedFile::clone(&summed) })
         };

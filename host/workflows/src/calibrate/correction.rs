@@ -111,7 +111,7 @@ pub fn learn(settings: &CalibrateCorrectionRequest, context: &Context<'_>) -> Re
     let correction = fit(settings.method, &patterns, &cdc)?;
     let (far_mm, near_mm) = correction.range_mm();
     let after = errors(&maps, Some(&correction))?;
-    for warning in unlike_others(&after) {
+    for warning in unlike_others(&after, |index| format!("pattern {}", index + 1)) {
         context.progress.warn(&warning);
     }
     let rounded = |mm: f64| rounded_for(far_mm - near_mm, mm, 4);
@@ -194,7 +194,7 @@ fn depths(map: ArrayView2<'_, f32>) -> impl Iterator<Item = f32> {
 }
 
 /// Sum of squared errors and number of depths of each pattern.
-fn errors(maps: &[(Array2<f32>, f64)], correction: Option<&Correction>) -> Result<Vec<[f64; 2]>> {
+pub fn errors(maps: &[(Array2<f32>, f64)], correction: Option<&Correction>) -> Result<Vec<[f64; 2]>> {
     let of_map = |(map, true_mm): &(Array2<f32>, f64)| {
         let corrected = correction.map(|correction| correction.apply(map.view())).transpose()?;
         let squares = depths(corrected.as_ref().unwrap_or(map).view());
@@ -209,15 +209,15 @@ fn rmse_mm(errors: &[[f64; 2]]) -> f64 {
     (sum / count).sqrt()
 }
 
-/// Names patterns whose error remains: a distance that was written down wrongly, or exchanged.
-fn unlike_others(errors: &[[f64; 2]]) -> Vec<String> {
+/// Findings on patterns whose error remains: a distance that was written down wrongly, or exchanged. `name` is of a pattern's index.
+pub fn unlike_others(errors: &[[f64; 2]], name: impl Fn(usize) -> String) -> Vec<String> {
     let rmse: Vec<f64> = errors.iter().map(|error| rmse_mm(std::slice::from_ref(error))).collect();
     let Some(median) = quantile::of_values(rmse.iter().copied(), 0.5) else { return Vec::new() };
     let unlike = |(_, mm): &(usize, &f64)| **mm > UNLIKE * median;
     let named = |(index, mm): (usize, &f64)| {
         let [mm, usual] = [*mm, median].map(|mm| rounded_for(median, mm, 3));
-        let number = index + 1;
-        format!("pattern {number}: an error of {mm} mm remains, {usual} mm is usual: is its true_mm right?")
+        let name = name(index);
+        format!("{name}: an error of {mm} mm remains, {usual} mm is usual: is its true_mm right?")
     };
     rmse.iter().enumerate().filter(unlike).map(named).collect()
 }
@@ -234,7 +234,7 @@ mod tests {
         let error = check_distance("pattern 3", &pattern(0.9)).unwrap_err().to_string();
         assert!(error.contains("0.9 of pattern 3") && error.contains("905.000 mm"), "{error}");
         let maps = vec![(map.clone(), 904.0), (map.clone(), 905.5), (map.clone(), 904.5), (map, 925.0)];
-        let found = unlike_others(&errors(&maps, None).unwrap());
+        let found = unlike_others(&errors(&maps, None).unwrap(), |index| format!("pattern {}", index + 1));
         assert!(
             found.len() == 1 && found[0].starts_with("pattern 4: an error of 20 mm remains"),
             "{found:?}"

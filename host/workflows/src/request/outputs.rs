@@ -5,7 +5,7 @@ use std::{
     path::{Component, Path, PathBuf},
 };
 
-use farnear_files::{staging::Staging, video::pictures};
+use farnear_files::{order::composed, staging::Staging, video::pictures};
 use serde_json::Value;
 
 use super::{PathKind, Request};
@@ -91,13 +91,14 @@ fn files(outputs: &[Output]) -> impl Iterator<Item = (&'static str, &Path)> {
 
 /// Whether a file would replace an input, or a picture in a folder of inputs.
 fn replaces(current: &Path, output: &Path, input: &Path) -> bool {
+    let (is_file, is_dir) = (current.join(output).is_file(), current.join(input).is_dir());
     let [output, input] = [output, input].map(|path| on_disk(current, path));
     let is_picture = |path: &Path| {
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
         pictures::EXTENSIONS.iter().chain(&["npy"]).any(|picture| ending == *picture)
     };
     output == input
-        || (output.starts_with(&input) && input.is_dir() && output.is_file() && is_picture(&output))
+        || (output.starts_with(&input) && is_dir && is_file && is_picture(&output))
 }
 
 /// Whether two paths name one place, or one names a place inside the other.
@@ -107,7 +108,8 @@ fn overlap(a: &Path, b: &Path) -> io::Result<bool> {
     Ok(a.starts_with(&b) || b.starts_with(&a))
 }
 
-/// `path` from the folder `base` without `.`, `..` and symbolic links. It need not exist.
+/// `path` from the folder `base` without `.`, `..` and symbolic links, and [`folded`] on systems that ignore case. It need not
+/// exist.
 pub(crate) fn on_disk(base: &Path, path: &Path) -> PathBuf {
     let mut found = base.to_path_buf();
     for part in path.components() {
@@ -120,7 +122,16 @@ pub(crate) fn on_disk(base: &Path, path: &Path) -> PathBuf {
             found = found.canonicalize().unwrap_or(found);
         }
     }
-    found
+    if cfg!(any(windows, target_os = "macos")) { folded(&found) } else { found }
+}
+
+/// One spelling of the names that Windows and macOS take for the same: small and composed letters, no `\\?\`.
+fn folded(path: &Path) -> PathBuf {
+    let text = composed(&path.to_string_lossy()).to_lowercase();
+    match text.strip_prefix(r"\\?\unc\") {
+        Some(share) => format!(r"\\{share}").into(),
+        None => text.strip_prefix(r"\\?\").unwrap_or(&text).into(),
+    }
 }
 
 #[cfg(test)]
@@ -218,6 +229,18 @@ mod tests {
         for place in [socket, "/dev/null".into(), "/dev/stdout".into()] {
             let error = check_folder("plot", &place).expect_err("refused");
             assert!(error.is_usage() && error.to_string().contains("name a file"), "{error}");
+        }
+    }
+
+    #[test]
+    fn names_that_differ_in_case_are_one_place_where_the_system_ignores_it() {
+        for (name, expected) in [
+            ("/Users/a/Ho\u{308}he", "/users/a/h\u{f6}he"),
+            (r"C:\Data\Far.PNG", r"c:\data\far.png"),
+            (r"\\?\C:\Data", r"c:\data"),
+            (r"\\?\UNC\server\Share\x", r"\\server\share\x"),
+        ] {
+            assert_eq!(folded(Path::new(name)), Path::new(expected), "{name}");
         }
     }
 

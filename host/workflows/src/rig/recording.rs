@@ -18,7 +18,7 @@ use std::{
 
 use farnear_capture::camera::{Image, pixels::Layout};
 use farnear_depth::{measure::Measurement, optics::Optics, stream::Stream};
-use farnear_files::staging::StagingError;
+use farnear_files::staging::{StagingError, rename};
 use ndarray::Array2;
 use serde::Serialize;
 
@@ -137,7 +137,7 @@ impl Recorder {
     }
 
     pub fn finish(mut self) -> Result<RecordingFigures> {
-        fs::rename(&self.partial, &self.target).map_err(StagingError::at(&self.target))?;
+        rename(&self.partial, &self.target).map_err(StagingError::at(&self.target))?;
         self.finished = true;
         Ok(RecordingFigures { pairs: self.pairs, seconds: rounded(self.last.as_secs_f64(), 3) })
     }

@@ -402,7 +402,8 @@ fn keypoint_files(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for entry in entries {
         let path = entry.map_err(WorkflowError::read("the recording", folder))?.path();
-        if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json")) {
+        let is_json = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
+        if is_json && !farnear_files::video::pictures::hidden(&path) {
             files.push(path);
         }
     }
@@ -439,4 +440,18 @@ pub(crate) fn check_fit(template: &Template, recording: &Recording, path: &Path)
         let fits = best.and_then(|best| Template::names().find(|name| *name == best.name));
         SilhouettesError::Unfit { path: path.into(), source, fits }.into()
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_macos_writes_next_to_a_frame_is_not_one() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["._frame_1.json", "frame_1.json", ".frame_2.json"] {
+            fs::write(folder.path().join(name), "{}").unwrap();
+        }
+        assert_eq!(keypoint_files(folder.path()).unwrap(), [folder.path().join("frame_1.json")]);
+    }
 }

@@ -1,6 +1,6 @@
 //! Silhouettes of public joint sets: capsules around the joints, drawn in views from all sides.
 
-use std::{fmt, fs, path::PathBuf, str::FromStr};
+use std::{fs, path::PathBuf};
 
 use farnear_silhouettes::readers::skeletons::{
     FLORENCE_15, FLORENCE_ACTIVITIES, KINECT_20, Layout, UTKINECT_ACTIVITIES, dress, read_cells,
@@ -69,26 +69,7 @@ pub enum SkeletonSet {
     Florence,
 }
 
-impl fmt::Display for SkeletonSet {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::UtKinect => "utkinect",
-            Self::Florence => "florence",
-        })
-    }
-}
-
-impl FromStr for SkeletonSet {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "utkinect" => Ok(Self::UtKinect),
-            "florence" => Ok(Self::Florence),
-            other => Err(format!("`{other}` is not a data set: expected utkinect or florence")),
-        }
-    }
-}
+farnear_silhouettes::named!(SkeletonSet, "data set", "utkinect" => UtKinect, "florence" => Florence);
 
 impl SkeletonSet {
     fn known(self) -> (Layout, &'static [&'static str]) {

@@ -3,8 +3,9 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::{BORDER_PX, Level, Model, MovedRow, STEP_PX};
+use super::{BORDER_PX, Level, Model, STEP_PX, moved_row};
 use crate::prepare::warp::{Warp, middle};
+use crate::simd::{self, Backend, StepSums};
 
 /// Least RMS difference of the bands for the outlier limit: that of equal images is 0.
 pub(super) const LEAST_SCALE: f64 = 1e-6;
@@ -31,6 +32,29 @@ impl Sums {
         self.count += other.count;
         self
     }
+
+    /// Adds the sums over the row at `y`. Along it, the derivative by each parameter is the gradient times a line in `x`.
+    fn add_row(&mut self, row: &StepSums, model: Model, y: f64) {
+        const AXES_AND_POWERS: [(usize, usize); 4] = [(0, 0), (0, 1), (1, 0), (1, 1)];
+        let [at_zero, at_one] = [0.0, 1.0].map(|x| model.basis(x, y));
+        let line = |parameter: usize, axis: usize| {
+            let [zero, one] = [at_zero, at_one].map(|basis| basis[parameter][axis]);
+            [zero, one - zero]
+        };
+        for i in 0..model.parameters() {
+            for (axis, power) in AXES_AND_POWERS {
+                let by = line(i, axis)[power];
+                self.right[i] += by * row.right[axis][power];
+                for j in 0..model.parameters() {
+                    for (other, other_power) in AXES_AND_POWERS {
+                        self.normal[i][j] +=
+                            by * line(j, other)[other_power] * row.normal[axis + other][power + other_power];
+                    }
+                }
+            }
+        }
+        self.squares += row.squares;
+    }
 }
 
 /// A Gauss-Newton step.
@@ -48,11 +72,7 @@ impl Step {
         let centre = middle((height, width));
         let unit = 0.5 * (height as f64).hypot(width as f64);
         let n = model.parameters();
-        let sums = match model {
-            Model::Shift => sums::<2>(level, warp, scale, centre, unit),
-            Model::Similarity => sums::<4>(level, warp, scale, centre, unit),
-            Model::Affine => sums::<6>(level, warp, scale, centre, unit),
-        };
+        let sums = sums(level, model, warp, scale, centre, unit);
         if sums.count < 8.0 * n as f64 {
             return None;
         }
@@ -85,118 +105,26 @@ fn rms_over_field(model: Model, covariance: &DMatrix<f64>, unit: f64, size: (usi
     (along(0) + along(1)).sqrt()
 }
 
-/// Pixels that are summed in parallel: the compiler vectorises them.
-const SIDE_BY_SIDE: usize = 8;
-
-/// Derivatives of the far image by each of `N` parameters at pixels with these gradients and places ([`Model::basis`]).
-#[inline(always)]
-fn jacobian<const N: usize>(
-    [gx, gy]: [&[f32; SIDE_BY_SIDE]; 2],
-    x: &[f32; SIDE_BY_SIDE],
-    y: f32,
-) -> [[f32; SIDE_BY_SIDE]; N] {
-    std::array::from_fn(|parameter| {
-        std::array::from_fn(|i| match (N, parameter) {
-            (_, 0) => gx[i],
-            (_, 1) => gy[i],
-            (4, 2) => gx[i] * x[i] + gy[i] * y,
-            (4, _) => gy[i] * x[i] - gx[i] * y,
-            (_, 2) => gx[i] * x[i],
-            (_, 3) => gx[i] * y,
-            (_, 4) => gy[i] * x[i],
-            (_, _) => gy[i] * y,
-        })
-    })
-}
-
-/// The sums of a step for a model of `N` parameters.
-fn sums<const N: usize>(level: &Level, warp: &Warp, scale: f64, centre: [f64; 2], unit: f64) -> Sums {
+/// The sums of a step.
+fn sums(level: &Level, model: Model, warp: &Warp, scale: f64, centre: [f64; 2], unit: f64) -> Sums {
     let (height, width) = level.far.dim();
     let step = (level.far.len() / STEP_PX).max(1);
     let rows: Vec<usize> = (BORDER_PX..height - BORDER_PX).step_by(step).collect();
     let Some(far) = level.far.as_slice() else { return Sums::NONE };
-    let of_scale = (2.4 * scale).recip() as f32;
+    let (backend, of_scale) = (Backend::best(), (2.4 * scale).recip() as f32);
     let of_rows = rows.par_chunks(16).map(|rows| {
-        let mut sums = Sums::NONE;
+        let (mut sums, mut near) = (Sums::NONE, vec![0.0; width]);
         for &y in rows {
-            sums = sums.plus(sums_of_row::<N>(far, width, y, level, warp, of_scale, centre, unit));
+            let inside = moved_row(&level.near, warp, y, &mut near);
+            let around = [y - 1, y, y + 1].map(|row| &far[row * width..][inside.start - 1..=inside.end]);
+            let place = [(inside.start as f64 - centre[0]) / unit, unit.recip()].map(|place| place as f32);
+            let of_row = simd::step_row(backend, around, &near[inside.clone()], place, of_scale);
+            sums.add_row(&of_row, model, (y as f64 - centre[1]) / unit);
+            sums.count += inside.len() as f64;
         }
         sums
     });
     // In order, so that the sum does not depend on the threads.
     let parts: Vec<Sums> = of_rows.collect();
     parts.into_iter().fold(Sums::NONE, Sums::plus)
-}
-
-#[allow(clippy::too_many_arguments)] // the innermost loop
-fn sums_of_row<const N: usize>(
-    far: &[f32],
-    width: usize,
-    y: usize,
-    level: &Level,
-    warp: &Warp,
-    of_scale: f32,
-    centre: [f64; 2],
-    unit: f64,
-) -> Sums {
-    const NONE: [f32; SIDE_BY_SIDE] = [0.0; SIDE_BY_SIDE];
-    let mut normal = [[NONE; N]; N];
-    let (mut right, mut squares, mut count) = ([NONE; N], NONE, 0_usize);
-    let row_of_field = ((y as f64 - centre[1]) / unit) as f32;
-    // Where nothing is displaced nothing is interpolated.
-    let in_place = match level.near.as_slice() {
-        Some(near) if *warp == Warp::IDENTITY && y + 1 + BORDER_PX < level.near.nrows() => {
-            &near[y * width..(y + 1) * width - 1 - BORDER_PX]
-        }
-        _ => &[],
-    };
-    let row = MovedRow::new(&level.near, warp, y, BORDER_PX..width - BORDER_PX);
-    for left in (BORDER_PX..width - BORDER_PX).step_by(SIDE_BY_SIDE) {
-        let [start, end] =
-            [row.inside.start, row.inside.end].map(|column| column.clamp(left, left + SIDE_BY_SIDE) - left);
-        let (mut near, mut present) = (NONE, NONE);
-        match in_place.get(left..left + SIDE_BY_SIDE) {
-            Some(values) => near.copy_from_slice(values),
-            None => (start..end).for_each(|i| near[i] = row.value(left + i)),
-        }
-        present[start..end].fill(1.0);
-        count += end - start;
-        // Beyond the row's end are pixels of the next one, without weight.
-        let at = y * width + left;
-        let [before, here, after, above, below] =
-            [at - 1, at, at + 1, at - width, at + width].map(|from| &far[from..from + SIDE_BY_SIDE]);
-        let gx: [f32; SIDE_BY_SIDE] = std::array::from_fn(|i| 0.5 * (after[i] - before[i]));
-        let gy: [f32; SIDE_BY_SIDE] = std::array::from_fn(|i| 0.5 * (below[i] - above[i]));
-        let difference: [f32; SIDE_BY_SIDE] = std::array::from_fn(|i| near[i] - here[i]);
-        let column = std::array::from_fn(|i| (((left + i) as f64 - centre[0]) / unit) as f32);
-        let weight: [f32; SIDE_BY_SIDE] = std::array::from_fn(|i| {
-            let relative = difference[i] * of_scale;
-            present[i] / (1.0 + relative * relative)
-        });
-        let jacobian = jacobian::<N>([&gx, &gy], &column, row_of_field);
-        for i in 0..N {
-            let weighted: [f32; SIDE_BY_SIDE] = std::array::from_fn(|x| weight[x] * jacobian[i][x]);
-            for x in 0..SIDE_BY_SIDE {
-                right[i][x] += weighted[x] * difference[x];
-            }
-            for j in i..N {
-                for x in 0..SIDE_BY_SIDE {
-                    normal[i][j][x] += weighted[x] * jacobian[j][x];
-                }
-            }
-        }
-        for x in 0..SIDE_BY_SIDE {
-            squares[x] += weight[x] * difference[x] * difference[x];
-        }
-    }
-    let whole = |parts: [f32; SIDE_BY_SIDE]| parts.into_iter().map(f64::from).sum::<f64>();
-    let mut sums = Sums { squares: whole(squares), count: count as f64, ..Sums::NONE };
-    for i in 0..N {
-        sums.right[i] = whole(right[i]);
-        for (j, parts) in normal[i].iter().enumerate().skip(i) {
-            sums.normal[i][j] = whole(*parts);
-            sums.normal[j][i] = sums.normal[i][j];
-        }
-    }
-    sums
 }

@@ -24,8 +24,9 @@ pub fn text(id: &Value) -> Option<String> {
     }
 }
 
-/// `NaN` and `Infinity`, which Python's json module writes, as `null`.
+/// Without a byte-order mark; `NaN` and `Infinity`, which Python's json module writes, as `null`.
 pub fn finite(bytes: &[u8]) -> Vec<u8> {
+    let bytes = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes);
     let mut out = Vec::with_capacity(bytes.len());
     let (mut at, mut quoted) = (0, false);
     while let Some(&byte) = bytes.get(at) {
@@ -43,4 +44,14 @@ pub fn finite(bytes: &[u8]) -> Vec<u8> {
         at += length;
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_byte_order_mark_is_left_out() {
+        assert_eq!(finite("\u{feff}{\"a\": NaN}".as_bytes()), b"{\"a\": null}");
+    }
 }
