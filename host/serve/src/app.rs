@@ -171,7 +171,9 @@ impl App {
     }
 
     pub fn set_rig(&self, rig: Option<OpenRig>) {
-        *lock(&self.rig) = rig;
+        // Dropped after the lock: the end of a rig may take seconds.
+        let before = std::mem::replace(&mut *lock(&self.rig), rig);
+        drop(before);
     }
 
     /// Sets the rig of the next connection.
@@ -381,8 +383,10 @@ impl App {
 
     /// Begins a job on the rig; the error is the title of the running job.
     pub fn begin_on_rig(&self, task: Task) -> Result<u64, String> {
-        let _ = self.take_stop_reason(); // of an earlier stop
-        let begun = self.rig_jobs.begin(task, |job| self.change(|state| state.job = Some(job)));
+        let begun = self.rig_jobs.begin(task, |job| {
+            let _ = self.take_stop_reason(); // of an earlier stop
+            self.change(|state| state.job = Some(job));
+        });
         if begun.is_ok() {
             self.interrupt_live();
         }

@@ -196,7 +196,9 @@ fn run(app: &App, begun: Begun, queue: &JobQueue, place: Place) {
     });
     // The board may report the stop before the work notices the cancellation.
     let stopped = |error: &WorkflowError| error.is_cancelled() || context.cancel.is_cancelled();
-    let reason = ended.as_ref().err().filter(|error| stopped(error)).and_then(|_| app.take_stop_reason());
+    let of_rig = std::ptr::eq(queue, &app.rig_jobs);
+    let reason =
+        ended.as_ref().err().filter(|error| of_rig && stopped(error)).and_then(|_| app.take_stop_reason());
     if let Err(error) = &ended {
         app.note(format!("{}: {error}", job.title));
     }
@@ -252,6 +254,30 @@ mod tests {
         let begun = app.begin_on_rig(Task::new("home", "Home", |_, _| Ok(())));
         assert_eq!(begun, Ok(1));
         wait_for(&app, |state| state.job.as_ref().is_some_and(|job| job.phase == JobPhase::Done));
+        app.end();
+        thread.join().expect("the thread ends with the program");
+    }
+
+    #[test]
+    fn the_reason_of_a_stop_is_not_that_of_a_cancelled_computation() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let app = app(folder.path());
+        drop(app.begin_stop_because("the browser has disconnected"));
+        let jobs = app.computing.open();
+        let computer = Arc::clone(&app);
+        let thread = std::thread::spawn(move || run_computing(&computer, &jobs));
+        let task = Task::new("depth", "Depth", |_, context| -> Result<(), WorkflowError> {
+            while !context.cancel.is_cancelled() {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            Err(WorkflowError::Cancelled { during: "depth".into() })
+        });
+        assert_eq!(app.begin_computing(task), Ok(1));
+        app.computing.cancel();
+        let ended = |state: &State| state.computation.as_ref().is_some_and(|job| job.phase == JobPhase::Stopped);
+        wait_for(&app, ended);
+        let error = app.state().computation.and_then(|job| job.error);
+        assert_eq!(error, Some(WorkflowError::Cancelled { during: "depth".into() }.to_string()));
         app.end();
         thread.join().expect("the thread ends with the program");
     }

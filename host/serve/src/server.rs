@@ -92,6 +92,7 @@ pub fn serve(
     let stopped = app.stop_everything(LAST_STOP);
     if matches!(stopped, Err(StopError::Unanswered)) || !ends_soon(&watch) {
         // What waits for a silent board is left behind, also the line, whose end would wait for its thread.
+        app.finish_recording();
         std::mem::forget(app);
         runtime.shutdown_background();
         served?;

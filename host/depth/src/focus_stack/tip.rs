@@ -209,7 +209,7 @@ mod tests {
 
     /// Steps of 1 to 4 times the width at half height; a floor as of noise.
     #[test]
-    fn the_floor_beside_a_coarse_peak_does_not_move_the_tip() {
+    fn the_floor_around_a_coarse_peak_does_not_move_the_tip() {
         let positions = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
         let found = |steps: f32, tip_at: f32| {
             let value = |p: &f64| (1.0 / (1.0 + (steps * (*p as f32 - tip_at)).powi(2))).hypot(0.03);

@@ -97,8 +97,7 @@ fn replaces(current: &Path, output: &Path, input: &Path) -> bool {
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
         pictures::EXTENSIONS.iter().chain(&["npy"]).any(|picture| ending == *picture)
     };
-    output == input
-        || (output.starts_with(&input) && is_dir && is_file && is_picture(&output))
+    output == input || (output.starts_with(&input) && is_dir && is_file && is_picture(&output))
 }
 
 /// Whether two paths name one place, or one names a place inside the other.

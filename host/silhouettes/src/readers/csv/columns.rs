@@ -109,7 +109,7 @@ pub fn frames(columns: &StringRecord, rows: &[StringRecord], has_people: bool) -
     Some(times.iter().map(|time| known.partition_point(|other| other < time).to_string()).collect())
 }
 
-/// Frames per second by a column of times and the median of its steps, to three decimals.
+/// Frames per second by a column of times and the mean of its usual steps, to three decimals.
 pub fn rate_hz(columns: &StringRecord, rows: &[StringRecord]) -> Option<f64> {
     let column = place(columns, &TIMES)?;
     let times: Vec<f64> = rows.iter().filter_map(|row| number(row.get(column)?)).collect();
@@ -118,13 +118,16 @@ pub fn rate_hz(columns: &StringRecord, rows: &[StringRecord]) -> Option<f64> {
     let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
     steps.sort_unstable_by(f64::total_cmp);
     let step = steps.get(steps.len() / 2).copied()?;
+    // Rounded times have steps of several lengths; a step over missing frames is longer.
+    let usual = &steps[..steps.partition_point(|other| *other < 1.5 * step)];
+    let mean = usual.iter().sum::<f64>() / usual.len() as f64;
     let name = simple(columns.get(column)?);
     let unit = ["timestamp", "time"].into_iter().find_map(|word| name.strip_prefix(word));
     let per_second = match STATED.iter().find(|(stated, _)| unit == Some(*stated)) {
         Some((_, units)) => *units,
         None => UNITS.iter().find(|(most, _)| step <= *most).map_or(1e9, |(_, units)| *units),
     };
-    Some((1000.0 * per_second / step).round() / 1000.0).filter(|rate| rate.is_finite() && *rate > 0.0)
+    Some((1000.0 * per_second / mean).round() / 1000.0).filter(|rate| rate.is_finite() && *rate > 0.0)
 }
 
 #[cfg(test)]
@@ -153,6 +156,16 @@ mod tests {
                 (0..4).map(|frame| format!("\n{}", 7.0 * step + step * f64::from(frame))).collect();
             let (columns, rows) = records(&format!("{column}{rows}"));
             assert_eq!(rate_hz(&columns, &rows), Some(25.0), "{column} {step}");
+        }
+    }
+
+    #[test]
+    fn rounded_times_have_the_rate_of_all_their_steps() {
+        for (column, rate, digits) in [("time", 30.0, 2), ("time", 60.0, 2), ("time_s", 60.0, 3)] {
+            let rows: String =
+                (0..=300).map(|frame| format!("\n{:.digits$}", f64::from(frame) / rate)).collect();
+            let (columns, rows) = records(&format!("{column}{rows}"));
+            assert_eq!(rate_hz(&columns, &rows), Some(rate), "{column} {rate}");
         }
     }
 
