@@ -36,6 +36,9 @@ impl From<corrections::Correction> for Correction {
     }
 }
 
+/// The text of a correction, and its findings.
+type Parts = (String, Vec<String>);
+
 #[pymethods]
 impl Correction {
     /// Fit a correction to flat targets.
@@ -85,7 +88,7 @@ impl Correction {
     }
 
     /// For pickle and copy.
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String, Vec<String>))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Parts)> {
         let parts = (self.dumps(py)?, self.findings.clone());
         Ok((py.get_type::<Self>().getattr("_assemble")?, parts))
     }

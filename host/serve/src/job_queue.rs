@@ -274,7 +274,8 @@ mod tests {
         });
         assert_eq!(app.begin_computing(task), Ok(1));
         app.computing.cancel();
-        let ended = |state: &State| state.computation.as_ref().is_some_and(|job| job.phase == JobPhase::Stopped);
+        let ended =
+            |state: &State| state.computation.as_ref().is_some_and(|job| job.phase == JobPhase::Stopped);
         wait_for(&app, ended);
         let error = app.state().computation.and_then(|job| job.error);
         assert_eq!(error, Some(WorkflowError::Cancelled { during: "depth".into() }.to_string()));

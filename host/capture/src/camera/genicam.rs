@@ -467,7 +467,7 @@ impl Drop for GenicamCamera {
     /// Where the camera is silent, the thread has the last reference and gives it up later.
     fn drop(&mut self) {
         let (camera, stream) = (self.camera.clone(), self.stream.take());
-        let (ended, end) = channel();
+        let (waits, end) = channel::<()>();
         let stop = move || {
             let answers = if stream.is_some() {
                 drop(stream);
@@ -476,11 +476,10 @@ impl Drop for GenicamCamera {
                 camera.device().is_some_and(|device| device.read_register(0).is_ok())
             };
             if !answers {
-                let _ = ended.send(());
+                drop(waits);
                 thread::sleep(FAREWELL);
             }
             drop(camera);
-            let _ = ended.send(()); // the wait may be over
         };
         if thread::Builder::new().name("camera end".into()).spawn(stop).is_ok() {
             let _ = end.recv_timeout(FAREWELL);

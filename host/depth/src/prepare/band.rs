@@ -250,9 +250,9 @@ fn means_along(backend: Backend, from: &[f32], r: usize, work: &mut [f32], to: &
     let width = from.len();
     let inner = r.min(width)..width.saturating_sub(r).max(r.min(width));
     let mut sum: f32 = from[..inner.start].iter().sum();
-    for x in 0..inner.start {
+    for (x, mean) in to[..inner.start].iter_mut().enumerate() {
         sum += from.get(x + r).unwrap_or(&0.0);
-        to[x] = sum / (x + r + 1).min(width) as f32;
+        *mean = sum / (x + r + 1).min(width) as f32;
     }
     let mut sum: f32 = from[width.saturating_sub(r)..].iter().sum();
     for x in (inner.end..width).rev() {
