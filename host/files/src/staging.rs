@@ -136,19 +136,19 @@ impl Staging {
     }
 
     fn begin(folder: PathBuf, target: PathBuf, made_target: bool) -> Result<Self, StagingError> {
-        // A killed program may have left this name; containers reuse process ids.
-        let mut free = folder.clone();
-        for number in 1..LEFT_BEHIND_MAX {
-            if !free.exists() {
-                break;
-            }
-            free = folder.with_added_extension(number.to_string());
-        }
         let parent = folder.parent().unwrap_or(Path::new("."));
         if SWEPT.lock().unwrap_or_else(PoisonError::into_inner).insert(parent.into()) {
             sweep(parent);
         }
-        fs::create_dir(&free).map_err(StagingError::at(&target))?;
+        // A killed program may have left this name, because containers reuse process ids; another thread may take it.
+        let (mut free, mut number) = (folder.clone(), 0);
+        while let Err(error) = fs::create_dir(&free) {
+            number += 1;
+            if error.kind() != io::ErrorKind::AlreadyExists || number == LEFT_BEHIND_MAX {
+                return Err(StagingError::at(&target)(error));
+            }
+            free = folder.with_added_extension(number.to_string());
+        }
         unpublished().push((free.clone(), made_target.then(|| target.clone())));
         let in_use = File::open(&free).ok().filter(|folder| folder.try_lock().is_ok());
         let (replaced, record) = (Vec::new(), None);
@@ -354,6 +354,22 @@ mod tests {
         assert!(living.folder.exists() && young.exists() && bystander.exists());
         living.finish().unwrap();
         assert!(root.path().join("living").exists());
+    }
+
+    #[test]
+    fn threads_that_write_to_one_place_have_their_own_folders() {
+        let root = tempfile::tempdir().unwrap();
+        let (target, start) = (root.path().join("out"), std::sync::Barrier::new(16));
+        std::thread::scope(|scope| {
+            let begin = || {
+                start.wait();
+                Staging::new_folder(&target).unwrap()
+            };
+            let begun: Vec<_> = (0..16).map(|_| scope.spawn(begin)).collect();
+            let begun: Vec<Staging> = begun.into_iter().map(|thread| thread.join().unwrap()).collect();
+            let folders: BTreeSet<&PathBuf> = begun.iter().map(|staging| &staging.folder).collect();
+            assert_eq!(folders.len(), begun.len());
+        });
     }
 
     #[cfg(unix)]

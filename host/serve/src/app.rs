@@ -67,7 +67,7 @@ pub struct App {
     live: Mutex<Live>,
     log: Mutex<VecDeque<LogLine>>,
     /// The running recording of live depth; `state.live.recording` changes while it is locked.
-    pub recorder: Mutex<Option<Recorder>>,
+    pub recorder: Mutex<Option<Running>>,
     pub uploads: Arc<UploadQuota>,
     /// The answer to a prompt, until the job takes it.
     pub answer: Mutex<Option<String>>,
@@ -76,6 +76,12 @@ pub struct App {
     /// Why the rig was stopped, if not by a user.
     stop_reason: Mutex<Option<String>>,
     pub stops: Arc<Stops>,
+}
+
+/// A recording, and the end of the view whose pairs it gets.
+pub struct Running {
+    pub recorder: Recorder,
+    pub view: Cancel,
 }
 
 #[derive(Clone, Debug)]
@@ -293,10 +299,18 @@ impl App {
         lock(&self.log).iter().cloned().collect()
     }
 
+    /// Finishes the recording of a view that was ended; that of a later view continues.
+    pub fn finish_ended_recording(&self) {
+        let is_of_later_view = |running: &Running| !running.view.is_cancelled();
+        if self.is_ending() || !lock(&self.recorder).as_ref().is_some_and(is_of_later_view) {
+            self.finish_recording();
+        }
+    }
+
     pub fn finish_recording(&self) {
         // Held until the state agrees: the next recording may begin meanwhile.
         let mut running = lock(&self.recorder);
-        let Some(recorder) = running.take() else { return };
+        let Some(Running { recorder, .. }) = running.take() else { return };
         let name = self.state().live.recording.unwrap_or_default();
         match recorder.finish() {
             Ok(found) => self.note(format!("recorded {name}: {} pairs, {} s", found.pairs, found.seconds)),

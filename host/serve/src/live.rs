@@ -58,6 +58,7 @@ pub fn look(app: &App) {
     let cancelled = context.cancel.is_cancelled() || app.is_ending();
     match ended {
         Err(error) if !error.is_cancelled() && !cancelled => fail(app, &error.to_string()),
+        _ if live.mode == LiveMode::Depth && context.cancel.is_cancelled() => app.finish_ended_recording(),
         _ if live.mode == LiveMode::Depth => app.finish_recording(),
         _ => {}
     }
@@ -137,14 +138,17 @@ fn look_at_depth(app: &App, rig: RigAddress, context: &Context<'_>, rate: &Rate)
         if shown.mode == LiveMode::Depth && shown.error.is_some() {
             app.change(|state| state.live.error = None);
         }
-        record(app, &depth);
+        // A view that was ended has the pairs of before.
+        if !context.cancel.is_cancelled() {
+            record(app, &depth);
+        }
         app.pictures.send_replace(depth_message::live(&depth, ends, rate.next()));
         enough(app)
     })
 }
 
 fn record(app: &App, depth: &LiveDepth<'_>) {
-    let added = lock(&app.recorder).as_mut().map(|recorder| recorder.add(depth.far, depth.near));
+    let added = lock(&app.recorder).as_mut().map(|running| running.recorder.add(depth.far, depth.near));
     match added {
         None | Some(Ok(true)) => {}
         Some(Ok(false)) => app.break_recording(&format!("it has {} pairs", recording::PAIRS_MAX)),

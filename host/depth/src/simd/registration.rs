@@ -192,20 +192,26 @@ fn add_columns<L: Lanes>(
     let (wx, wy) = (weight.mul(gx), weight.mul(gy));
     let (wx_x, wy_x) = (wx.mul(x), wy.mul(x));
     let (gx_x, gy_x) = (gx.mul(x), gy.mul(x));
-    sums[0] = wx.mul_add(gx, sums[0]);
-    sums[1] = wx_x.mul_add(gx, sums[1]);
-    sums[2] = wx_x.mul_add(gx_x, sums[2]);
-    sums[3] = wx.mul_add(gy, sums[3]);
-    sums[4] = wx_x.mul_add(gy, sums[4]);
-    sums[5] = wx_x.mul_add(gy_x, sums[5]);
-    sums[6] = wy.mul_add(gy, sums[6]);
-    sums[7] = wy_x.mul_add(gy, sums[7]);
-    sums[8] = wy_x.mul_add(gy_x, sums[8]);
-    sums[9] = wx.mul_add(difference, sums[9]);
-    sums[10] = wx_x.mul_add(difference, sums[10]);
-    sums[11] = wy.mul_add(difference, sums[11]);
-    sums[12] = wy_x.mul_add(difference, sums[12]);
-    sums[13] = weight.mul(difference).mul_add(difference, sums[13]);
+    let products = [
+        (wx, gx),
+        (wx_x, gx),
+        (wx_x, gx_x),
+        (wx, gy),
+        (wx_x, gy),
+        (wx_x, gy_x),
+        (wy, gy),
+        (wy_x, gy),
+        (wy_x, gy_x),
+        (wx, difference),
+        (wx_x, difference),
+        (wy, difference),
+        (wy_x, difference),
+        (weight.mul(difference), difference),
+    ];
+    for i in 0..SUMS {
+        let (a, b) = products[i];
+        sums[i] = a.mul_add(b, sums[i]);
+    }
 }
 
 dispatch! {

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::{Body, Shared, aside};
 use crate::{
     api::{Api, For},
-    app::{App, lock},
+    app::{App, Running, lock},
     failure::Failure,
     job_queue::Task,
     live,
@@ -112,7 +112,8 @@ async fn record(
 fn begin_recording(app: &App) -> Result<(), Failure> {
     // Held until the state shows the recording: live depth that ends meanwhile finishes it afterwards.
     let mut recorder = lock(&app.recorder);
-    if app.live().mode != LiveMode::Depth {
+    let live = app.live();
+    if live.mode != LiveMode::Depth {
         return Err(Failure::new(StatusCode::CONFLICT, "live depth is off: there is nothing to record")
             .with_hint("Begin live depth first."));
     }
@@ -123,7 +124,8 @@ fn begin_recording(app: &App) -> Result<(), Failure> {
     let free =
         (1..).map(|number| format!("live-{number:03}{ENDING}")).find(|name| !folder.join(name).exists());
     let name = free.unwrap_or_default();
-    *recorder = Some(Recorder::begin(&folder.join(&name), &GivenOptics::read(&app.optics_file())?)?);
+    let begun = Recorder::begin(&folder.join(&name), &GivenOptics::read(&app.optics_file())?)?;
+    *recorder = Some(Running { recorder: begun, view: live.cancel });
     app.change(|state| (state.live.recording, state.live.recording_ended) = (Some(name), None));
     Ok(())
 }
@@ -167,6 +169,20 @@ mod tests {
             let refused = begun.join().unwrap().unwrap_err();
             assert!(refused.error.contains("live depth is off"), "{refused:?}");
         });
+        assert!(lock(&app.recorder).is_none() && app.state().live.recording.is_none());
+    }
+
+    #[test]
+    fn a_view_that_ends_late_does_not_end_the_recording_of_the_next_one() {
+        let session = tempfile::tempdir().unwrap();
+        let app = app(session.path());
+        app.set_live(|live| live.mode = LiveMode::Depth);
+        app.set_live(|live| live.exposure.0 += 1);
+        begin_recording(&app).unwrap();
+        app.finish_ended_recording();
+        assert!(lock(&app.recorder).is_some());
+        app.set_live(|live| live.exposure.0 += 1);
+        app.finish_ended_recording();
         assert!(lock(&app.recorder).is_none() && app.state().live.recording.is_none());
     }
 
