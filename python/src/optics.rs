@@ -58,7 +58,7 @@ fn psf_of(text: &str) -> PyResult<Psf> {
 #[derive(Clone)]
 pub struct Optics(
     pub farnear_depth::optics::Optics,
-    // Whether a point spread function was named.
+    // False only for a file without `[psf]`.
     bool,
 );
 

@@ -20,7 +20,7 @@ use crate::{
 
 /// Its tests read the whole repository.
 const SEES_EVERYTHING: &str = "xtask";
-/// Their tests run the programs or the firmware; others depend on their own files only.
+/// Their tests run the programs or the firmware.
 const RUN_PROGRAMS: [&str; 4] = ["farnear", "farnear-sim", "farnear-campaign", "farnear-capture"];
 /// Relative to the repository's root; see `tools/test-data`.
 const REAL_DATA: &str = "../shared/data";
@@ -155,6 +155,11 @@ fn dependencies(test: &Program, programs: &[PathBuf], elf: &Path) -> Result<Stri
     }
     let mut files = files(&test.folder)?;
     files.extend(self::files(&ROOT.join("examples"))?);
+    if test.package == "farnear" {
+        // Its tests run the commands of the documents.
+        files.extend(self::files(&ROOT.join("docs"))?);
+        files.extend(self::files(&ROOT.join("README.md"))?);
+    }
     for file in files.iter().filter(|file| !file.ends_with(".rs") && ROOT.join(file).is_file()) {
         file.hash(&mut hasher);
         hash_file(&ROOT.join(file), &mut hasher)?;
@@ -253,6 +258,22 @@ pub fn written(place: &Path, opening: &str) -> Result<u32> {
 
 #[cfg(test)]
 mod tests {
+    #[test]
+    fn packages_with_tests_on_the_emulated_rig_are_known_to_run_programs() {
+        let packages = std::fs::read_dir(super::ROOT.join("host")).unwrap().flatten();
+        let mut found = 0;
+        for package in packages.map(|package| package.path()) {
+            let read = |name: &str| std::fs::read_to_string(package.join(name)).unwrap_or_default();
+            if read("build.rs").contains("declare_emulated_rig") {
+                let manifest = read("Cargo.toml");
+                let name = manifest.lines().find_map(|line| line.strip_prefix("name = ")).unwrap();
+                assert!(super::RUN_PROGRAMS.contains(&name.trim_matches('"')), "{name}");
+                found += 1;
+            }
+        }
+        assert!(found > 0);
+    }
+
     use super::count;
 
     #[test]

@@ -32,7 +32,7 @@
 //! link speed.
 //!
 //! Cost in instructions, counted on the emulated board, of 33,600 per tick at 168 MHz: a tick 1,400 at rest, 2,600 with
-//! the piezo's loop closed, 4,300 with both steppers at 40 kHz, too; the last byte of a move request 1,800, the
+//! the piezo's loop closed, 4,300 with it and both steppers at 40 kHz; the last byte of a move request 1,800, the
 //! start 32,000. Mathematics may exceed a tick (a row of 640 pixels 15,000, a fit 742,000) and is rejected during
 //! motion. RAM: 25 KiB, 12 of them scratch memory for depth correction. Stack: 10 KiB for a request, 19 KiB for the
 //! start. Ramps and shadow use single precision, only the fit double.

@@ -32,7 +32,6 @@ pub(crate) use preparation::{
 };
 pub(crate) use registration::{
     StepSums, between_rows, divide_by_polynomial, divide_by_root, find_taps, products, step_row,
-    weigh_six_rows,
 };
 pub(crate) use rows::{
     CubicRow, Extremes, SEVEN_BLOCK, WindowRow, confidence_row, extremes, normalise_row, vertical_sums,
@@ -45,29 +44,29 @@ pub(crate) use windows::{
 
 /// Calls the generic function inside one with the backend's instructions enabled, so that it is compiled with them.
 macro_rules! dispatch {
-    ($(#[$attribute:meta])* fn $name:ident($($argument:ident: $type:ty),* $(,)?) $(-> $result:ty)? = $generic:ident) => {
+    ($(#[$attribute:meta])* fn $name:ident $(<const $n:ident: usize>)?($($argument:ident: $type:ty),* $(,)?) $(-> $result:ty)? = $generic:ident) => {
         $(#[$attribute])*
-        pub(crate) fn $name(backend: crate::simd::Backend, $($argument: $type),*) $(-> $result)? {
+        pub(crate) fn $name $(<const $n: usize>)?(backend: crate::simd::Backend, $($argument: $type),*) $(-> $result)? {
             #[cfg(target_arch = "x86_64")]
             #[target_feature(enable = "avx512f")]
-            fn avx512($($argument: $type),*) $(-> $result)? {
-                $generic::<crate::simd::lanes::Avx512>($($argument),*)
+            fn avx512 $(<const $n: usize>)?($($argument: $type),*) $(-> $result)? {
+                $generic::<crate::simd::lanes::Avx512 $(, $n)?>($($argument),*)
             }
             #[cfg(target_arch = "x86_64")]
             #[target_feature(enable = "avx2,fma")]
-            fn avx2($($argument: $type),*) $(-> $result)? {
-                $generic::<crate::simd::lanes::Avx2>($($argument),*)
+            fn avx2 $(<const $n: usize>)?($($argument: $type),*) $(-> $result)? {
+                $generic::<crate::simd::lanes::Avx2 $(, $n)?>($($argument),*)
             }
             match backend.checked() {
                 // SAFETY: `checked` falls back to portable code unless the processor has the instructions.
                 #[cfg(target_arch = "x86_64")]
-                crate::simd::Backend::Avx512 => unsafe { avx512($($argument),*) },
+                crate::simd::Backend::Avx512 => unsafe { avx512 $(::<$n>)?($($argument),*) },
                 #[cfg(target_arch = "x86_64")]
-                crate::simd::Backend::Avx2 => unsafe { avx2($($argument),*) },
+                crate::simd::Backend::Avx2 => unsafe { avx2 $(::<$n>)?($($argument),*) },
                 // The target guarantees NEON: nothing to enable or detect.
                 #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
-                crate::simd::Backend::Neon => $generic::<crate::simd::neon::Neon>($($argument),*),
-                _ => $generic::<crate::simd::lanes::Portable>($($argument),*),
+                crate::simd::Backend::Neon => $generic::<crate::simd::neon::Neon $(, $n)?>($($argument),*),
+                _ => $generic::<crate::simd::lanes::Portable $(, $n)?>($($argument),*),
             }
         }
     };
@@ -89,20 +88,17 @@ pub enum Backend {
 }
 
 impl Backend {
+    /// The fastest first.
+    const ALL: [Self; 4] = [Self::Avx512, Self::Avx2, Self::Neon, Self::Portable];
+
     /// The fastest available.
     pub fn best() -> Self {
-        [Self::Avx512, Self::Avx2, Self::Neon]
-            .into_iter()
-            .find(|b| b.is_available())
-            .unwrap_or(Self::Portable)
+        Self::ALL.into_iter().find(|b| b.is_available()).unwrap_or(Self::Portable)
     }
 
     /// All available, the fastest first.
     pub fn available() -> Vec<Self> {
-        [Self::Avx512, Self::Avx2, Self::Neon, Self::Portable]
-            .into_iter()
-            .filter(|b| b.is_available())
-            .collect()
+        Self::ALL.into_iter().filter(|b| b.is_available()).collect()
     }
 
     /// Whether this processor has it.

@@ -73,8 +73,6 @@ pub struct App {
     pub answer: Mutex<Option<String>>,
     ending: watch::Sender<bool>,
     reconnect: AtomicBool,
-    /// Why the rig was stopped, if not by a user.
-    stop_reason: Mutex<Option<String>>,
     pub stops: Arc<Stops>,
 }
 
@@ -148,7 +146,6 @@ impl App {
             recorder: Mutex::default(),
             uploads: Arc::default(),
             ending: watch::Sender::new(false),
-            stop_reason: Mutex::default(),
             stops: Arc::default(),
         }))
     }
@@ -301,16 +298,17 @@ impl App {
 
     /// Finishes the recording of a view that was ended; that of a later view continues.
     pub fn finish_ended_recording(&self) {
-        let is_of_later_view = |running: &Running| !running.view.is_cancelled();
-        if self.is_ending() || !lock(&self.recorder).as_ref().is_some_and(is_of_later_view) {
-            self.finish_recording();
-        }
+        self.finish_recording_if(|running| self.is_ending() || running.view.is_cancelled());
     }
 
     pub fn finish_recording(&self) {
+        self.finish_recording_if(|_| true);
+    }
+
+    fn finish_recording_if(&self, ends: impl FnOnce(&mut Running) -> bool) {
         // Held until the state agrees: the next recording may begin meanwhile.
         let mut running = lock(&self.recorder);
-        let Some(Running { recorder, .. }) = running.take() else { return };
+        let Some(Running { recorder, .. }) = running.take_if(ends) else { return };
         let name = self.state().live.recording.unwrap_or_default();
         match recorder.finish() {
             Ok(found) => self.note(format!("recorded {name}: {} pairs, {} s", found.pairs, found.seconds)),
@@ -330,23 +328,22 @@ impl App {
 
     /// As [`Self::begin_stop`], for a reason that the stopped job or live depth reports.
     pub fn begin_stop_because(&self, reason: &str) -> Stop {
-        *lock(&self.stop_reason) = Some(reason.into());
         let was_depth = self.live().mode == LiveMode::Depth;
-        let stop = self.begin_stop();
+        let stop = self.begin_stop_for(Some(reason));
         if was_depth {
             self.change(|state| state.live.error = Some(reason.into()));
         }
         stop
     }
 
-    pub fn take_stop_reason(&self) -> Option<String> {
-        lock(&self.stop_reason).take()
-    }
-
     /// Ends jobs and live depth. Nothing begins until the returned [`Stop`] has reached the board.
     pub fn begin_stop(&self) -> Stop {
+        self.begin_stop_for(None)
+    }
+
+    fn begin_stop_for(&self, reason: Option<&str>) -> Stop {
         let stop = self.stops.begin(self.rig());
-        self.rig_jobs.cancel();
+        self.rig_jobs.cancel(reason);
         // Live depth moves the piezo; the live image does not.
         self.set_live(|live| {
             if live.mode == LiveMode::Depth {
@@ -377,7 +374,7 @@ impl App {
     /// Stops the rig and all computations when the program ends. Waits at most `patience` for the board.
     pub fn stop_everything(&self, patience: Duration) -> Result<(), StopError> {
         self.end();
-        self.computing.cancel();
+        self.computing.cancel(None);
         self.set_live(|live| live.mode = LiveMode::Off);
         self.begin_stop().tell(patience)
     }
@@ -397,10 +394,7 @@ impl App {
 
     /// Begins a job on the rig; the error is the title of the running job.
     pub fn begin_on_rig(&self, task: Task) -> Result<u64, String> {
-        let begun = self.rig_jobs.begin(task, |job| {
-            let _ = self.take_stop_reason(); // of an earlier stop
-            self.change(|state| state.job = Some(job));
-        });
+        let begun = self.rig_jobs.begin(task, |job| self.change(|state| state.job = Some(job)));
         if begun.is_ok() {
             self.interrupt_live();
         }

@@ -56,8 +56,15 @@ pub struct JobQueue {
 #[derive(Default)]
 struct Inner {
     sender: Option<Sender<Begun>>,
-    running: Option<(String, Cancel)>,
+    running: Option<Running>,
     last: u64,
+}
+
+struct Running {
+    title: String,
+    cancel: Cancel,
+    /// Why it was cancelled, if not by a user.
+    reason: Option<String>,
 }
 
 pub struct Begun {
@@ -80,7 +87,7 @@ impl JobQueue {
     /// Begins a job and returns its number; the error is the title of the running job.
     pub fn begin(&self, task: Task, told: impl FnOnce(Job)) -> Result<u64, String> {
         let mut inner = lock(&self.inner);
-        if let Some((title, _)) = &inner.running {
+        if let Some(Running { title, .. }) = &inner.running {
             return Err(title.clone());
         }
         inner.last += 1;
@@ -103,14 +110,20 @@ impl JobQueue {
         if !sent {
             return Err("the program ends".into());
         }
-        inner.running = Some((task.title, cancel));
+        inner.running = Some(Running { title: task.title, cancel, reason: None });
         Ok(job.id)
     }
 
-    pub fn cancel(&self) {
-        if let Some((_, cancel)) = &lock(&self.inner).running {
-            cancel.cancel();
+    /// Cancels the running job, which reports the reason.
+    pub fn cancel(&self, reason: Option<&str>) {
+        if let Some(running) = &mut lock(&self.inner).running {
+            running.reason = reason.map(str::to_owned).or(running.reason.take());
+            running.cancel.cancel();
         }
+    }
+
+    fn reason(&self) -> Option<String> {
+        lock(&self.inner).running.as_ref()?.reason.clone()
     }
 
     pub fn is_busy(&self) -> bool {
@@ -196,9 +209,7 @@ fn run(app: &App, begun: Begun, queue: &JobQueue, place: Place) {
     });
     // The board may report the stop before the work notices the cancellation.
     let stopped = |error: &WorkflowError| error.is_cancelled() || context.cancel.is_cancelled();
-    let of_rig = std::ptr::eq(queue, &app.rig_jobs);
-    let reason =
-        ended.as_ref().err().filter(|error| of_rig && stopped(error)).and_then(|_| app.take_stop_reason());
+    let reason = ended.as_ref().err().filter(|error| stopped(error)).and_then(|_| queue.reason());
     if let Err(error) = &ended {
         app.note(format!("{}: {error}", job.title));
     }
@@ -273,7 +284,7 @@ mod tests {
             Err(WorkflowError::Cancelled { during: "depth".into() })
         });
         assert_eq!(app.begin_computing(task), Ok(1));
-        app.computing.cancel();
+        app.computing.cancel(None);
         let ended =
             |state: &State| state.computation.as_ref().is_some_and(|job| job.phase == JobPhase::Stopped);
         wait_for(&app, ended);

@@ -138,7 +138,7 @@ fn look_at_depth(app: &App, rig: RigAddress, context: &Context<'_>, rate: &Rate)
         if shown.mode == LiveMode::Depth && shown.error.is_some() {
             app.change(|state| state.live.error = None);
         }
-        // A view that was ended has the pairs of before.
+        // A cancelled view may still give a pair of the earlier settings.
         if !context.cancel.is_cancelled() {
             record(app, &depth);
         }

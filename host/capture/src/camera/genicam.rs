@@ -467,16 +467,16 @@ impl Drop for GenicamCamera {
     /// Where the camera is silent, the thread has the last reference and gives it up later.
     fn drop(&mut self) {
         let (camera, stream) = (self.camera.clone(), self.stream.take());
-        let (waits, end) = channel::<()>();
+        let (caller_waits, end) = channel::<()>();
         let stop = move || {
-            let answers = if stream.is_some() {
+            let has_stopped = stream.is_some_and(|stream| {
                 drop(stream);
                 camera.stop_acquisition().is_ok()
-            } else {
-                camera.device().is_some_and(|device| device.read_register(0).is_ok())
-            };
-            if !answers {
-                drop(waits);
+            });
+            // A camera may refuse to stop.
+            let answers = || camera.device().is_some_and(|device| device.read_register(0).is_ok());
+            if !has_stopped && !answers() {
+                drop(caller_waits);
                 thread::sleep(FAREWELL);
             }
             drop(camera);

@@ -65,18 +65,18 @@ fn tip_of(curve: &[f32], positions: &[f64], fit_points: usize) -> Tip {
     let unit = (positions[largest + 1] - positions[largest - 1]) / 2.0;
     let [mut reciprocal, mut logarithm] = [Parabola::default(), Parabola::default()];
     let seen: Vec<usize> = window.filter(|i| curve[*i].is_finite()).collect();
-    let is_coarse = is_coarse(curve, &seen, largest);
+    let coarse = is_coarse(curve, &seen, largest);
     for (at, &i) in seen.iter().enumerate() {
         let value = f64::from((curve[i] / most).max(1e-6));
         let t = (positions[i] - positions[largest]) / unit;
         // A sample next to a gap also counts for the gap: the samples then weigh as if they were even.
         let [before, after] = [at.saturating_sub(1), (at + 1).min(seen.len() - 1)];
         let spacing = (positions[seen[after]] - positions[seen[before]]) / (unit * (after - before) as f64);
-        // Equal noise of all values: the weight is the squared inverse derivative. Three points need no weights.
-        match is_coarse {
-            true if i.abs_diff(largest) > 1 => (),
-            true => reciprocal.add(t, -1.0 / value, 1.0),
-            false => reciprocal.add(t, -1.0 / value, value.powi(4) * spacing),
+        // Equal noise of all values: the weight is the squared inverse derivative. Three points need none, and fourth powers of
+        // low ones are below the precision of the sums.
+        let weight = if coarse { 1.0 } else { value.powi(4) * spacing };
+        if !coarse || i.abs_diff(largest) <= 1 {
+            reciprocal.add(t, -1.0 / value, weight);
         }
         logarithm.add(t, value.ln(), value * value * spacing);
     }
@@ -92,8 +92,10 @@ fn tip_of(curve: &[f32], positions: &[f64], fit_points: usize) -> Tip {
     Tip { place: place as f32, reliability, sharpness: most, rise }
 }
 
-/// Largest low value, relative to the tip's, and largest height of a low value above the least, relative to the tip's height.
+/// Largest low value relative to the tip's. With steps of the width at half height, `1 / (1 + t^2)` has at most 0.2 beyond the tip
+/// and one neighbour; with half of these steps it has 0.5 next to the tip.
 const LOW: f32 = 0.4;
+/// Largest height of a low value above the least value, relative to the tip's height.
 const LOW_ABOVE_LEAST: f32 = 0.2;
 
 /// Whether all values but the largest and one neighbour are low: the steps are about as wide as the curve, or wider. Values

@@ -3,7 +3,7 @@
 //! Defocus preserves light, so means over blocks far larger than the blur are alike in both images. Their ratio is
 //! exposure, lamp, aperture and vignetting. A polynomial of fourth degree over the field, which follows vignetting
 //! (`r^2` and `r^4` about any centre), is fitted; Huber's weights suppress blocks with motion or much light spread
-//! across the border. Cost: one pass over both images for the means; one multiplication and a Horner sum per pixel to
+//! across the border. Cost: one pass over both images for the means; one division or multiplication and a Horner sum per pixel to
 //! apply.
 
 use nalgebra::{DMatrix, DVector};

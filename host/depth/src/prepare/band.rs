@@ -22,27 +22,15 @@ pub(crate) fn halved(image: ArrayView2<f32>) -> Array2<f32> {
     const WEIGHTS: [f32; 4] = [0.125, 0.375, 0.375, 0.125];
     let (height, width) = image.dim();
     let (rows, columns) = (height / 2, width / 2);
-    let backend = Backend::best();
+    let (image, backend) = (image.as_standard_layout(), Backend::best());
     let mut half = Array2::zeros((rows, columns));
     half.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each_init(
         || vec![0.0_f32; width + 2],
         |across, (y, mut row)| {
             // One reflected pixel on either side, so that every output has its four taps in a slice.
-            let inner = &mut across[1..=width];
             let taps = [0, 1, 2, 3].map(|tap| image.row(reflect(2 * y as isize + tap - 1, height)));
-            match taps.each_ref().map(|row| row.as_slice()) {
-                [Some(a), Some(b), Some(c), Some(d)] => {
-                    for ((((sum, a), b), c), d) in inner.iter_mut().zip(a).zip(b).zip(c).zip(d) {
-                        *sum = WEIGHTS[0] * a + WEIGHTS[1] * b + WEIGHTS[2] * c + WEIGHTS[3] * d;
-                    }
-                }
-                _ => {
-                    inner.fill(0.0);
-                    for (from, weight) in taps.iter().zip(WEIGHTS) {
-                        inner.iter_mut().zip(from).for_each(|(sum, value)| *sum += weight * value);
-                    }
-                }
-            }
+            let taps = taps.each_ref().map(|row| row.as_slice().unwrap_or_default());
+            simd::weigh_rows(backend, taps, WEIGHTS, &mut across[1..=width]);
             across[0] = across[1 + reflect(-1, width)];
             across[width + 1] = across[1 + reflect(width as isize, width)];
             let Some(row) = row.as_slice_mut() else { unreachable!("made in standard layout") };

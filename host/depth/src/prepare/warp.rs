@@ -145,7 +145,7 @@ impl Lanczos {
 
 /// The image resampled by `warp`: pixel `p` of the result is `image` at `warp(p)`, interpolated by Lanczos' kernel of
 /// three lobes, which keeps the operators' frequencies (up to 0.6 of Nyquist) to 2 %. NaN outside and where a NaN pixel
-/// has a weight. Cost: 12 multiply-adds per pixel where neighbours lie between the same rows, 54 elsewhere; on all
+/// has a weight. Cost: 12 multiply-adds per pixel where neighbours lie between the same rows, up to 42 elsewhere; on all
 /// threads of the pool.
 pub fn resample(image: ArrayView2<f32>, warp: &Warp) -> Array2<f32> {
     resample_by(image, |place| warp.at(place))
@@ -261,7 +261,7 @@ impl Places {
         let columns = &mut columns[..last + TAPS - from];
         let rows: [&[f32]; TAPS] =
             std::array::from_fn(|row| &pixels[(top + row) * width + from..][..columns.len()]);
-        simd::weigh_six_rows(backend, rows, lanczos.0[phase], columns);
+        simd::weigh_rows(backend, rows, lanczos.0[phase], columns);
         for ((to, left), phase) in to.iter_mut().zip(lefts).zip(&self.phase[0][part]) {
             let at = *left as usize - from;
             let weights = &lanczos.0[*phase as usize];

@@ -21,16 +21,30 @@ fn roll_generic<L: Lanes>(rows: [&[f32]; 2], sums: &mut [f64], share: f64, to: &
 }
 
 dispatch! {
-    fn weigh_rows(rows: [&[f32]; 5], weights: [f32; 5], to: &mut [f32]) = weigh_generic
+    /// The weighted sum of rows.
+    fn weigh_rows<const N: usize>(rows: [&[f32]; N], weights: [f32; N], to: &mut [f32]) = weigh_generic
 }
 
 #[inline(always)]
-fn weigh_generic<L: Lanes>(rows: [&[f32]; 5], weights: [f32; 5], to: &mut [f32]) {
+fn weigh_generic<L: Lanes, const N: usize>(rows: [&[f32]; N], weights: [f32; N], to: &mut [f32]) {
     let width = to.len();
-    let [a, b, c, d, e] = rows.map(|row| &row[..width]);
-    for x in 0..width {
-        let first = (weights[0] * a[x] + weights[1] * b[x]) + weights[2] * c[x];
-        to[x] = (first + weights[3] * d[x]) + weights[4] * e[x];
+    let whole = width - width % MAX_LANES;
+    for x in (0..whole).step_by(MAX_LANES) {
+        let mut sums = [0.0_f32; MAX_LANES];
+        for row in 0..N {
+            let values = &rows[row][x..x + MAX_LANES];
+            for i in 0..MAX_LANES {
+                sums[i] += weights[row] * values[i];
+            }
+        }
+        to[x..x + MAX_LANES].copy_from_slice(&sums);
+    }
+    for x in whole..width {
+        let mut sum = 0.0;
+        for row in 0..N {
+            sum += weights[row] * rows[row][x];
+        }
+        to[x] = sum;
     }
 }
 

@@ -51,21 +51,6 @@ fn to_integer(value: f64) -> i32 {
 }
 
 dispatch! {
-    /// The weighted sum of six rows.
-    fn weigh_six_rows(rows: [&[f32]; 6], weights: [f32; 6], to: &mut [f32]) = weigh_six_generic
-}
-
-#[inline(always)]
-fn weigh_six_generic<L: Lanes>(rows: [&[f32]; 6], w: [f32; 6], to: &mut [f32]) {
-    let width = to.len();
-    let (a, b, c) = (&rows[0][..width], &rows[1][..width], &rows[2][..width]);
-    let (d, e, f) = (&rows[3][..width], &rows[4][..width], &rows[5][..width]);
-    for x in 0..width {
-        to[x] = w[0] * a[x] + w[1] * b[x] + w[2] * c[x] + w[3] * d[x] + w[4] * e[x] + w[5] * f[x];
-    }
-}
-
-dispatch! {
     /// Divides a row by a polynomial of the fourth degree, or multiplies by it. The first column is at `place[0]`, each other
     /// one `place[1]` farther.
     fn divide_by_polynomial(coefficients: [f32; 5], place: [f64; 2], multiplies: bool, row: &mut [f32]) =
@@ -249,7 +234,7 @@ fn products_generic<L: Lanes>(a: &[f32], b: &[f32]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd::Backend;
+    use crate::simd::{Backend, weigh_rows};
 
     fn value(seed: usize, x: usize) -> f32 {
         ((seed + x * x * 104_729 + x * 31) % 101) as f32 / 101.0 - 0.5
@@ -360,7 +345,7 @@ mod tests {
                 let rows = [1, 2, 3, 4, 5, 6].map(|seed| row(10 * seed, width));
                 let weights = [0.5, -0.25, 1.0, 2.0, 0.125, -1.5];
                 let mut sum = vec![0.0; width];
-                weigh_six_rows(backend, rows.each_ref().map(|row| &row[..]), weights, &mut sum);
+                weigh_rows(backend, rows.each_ref().map(|row| &row[..]), weights, &mut sum);
                 let mut quotient: Vec<f32> = rows[1].iter().map(|value| value + 1.0).collect();
                 divide_by_root(backend, &rows[0], 0.5, &mut quotient);
                 let coefficients = [1.0, 0.2, -0.1, 0.3, -0.05];

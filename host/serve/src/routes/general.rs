@@ -98,7 +98,7 @@ async fn halt(State(app): Shared, Body(Nothing {}): Body<Nothing>) -> Result<Jso
     app.note("emergency stop");
     aside(move || {
         let halted = answered_within(PATIENCE, move || rig.halt());
-        app.rig_jobs.cancel();
+        app.rig_jobs.cancel(None);
         Ok(halted?)
     })
     .await?;
@@ -106,7 +106,7 @@ async fn halt(State(app): Shared, Body(Nothing {}): Body<Nothing>) -> Result<Jso
 }
 
 async fn cancel(State(app): Shared, Body(Nothing {}): Body<Nothing>) -> Json<Done> {
-    app.computing.cancel();
+    app.computing.cancel(None);
     Json(DONE)
 }
 

@@ -118,8 +118,14 @@ pub fn rate_hz(columns: &StringRecord, rows: &[StringRecord]) -> Option<f64> {
     let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
     steps.sort_unstable_by(f64::total_cmp);
     let step = steps.get(steps.len() / 2).copied()?;
-    // Rounded times have steps of several lengths; a step over missing frames is longer.
-    let usual = &steps[..steps.partition_point(|other| *other < 1.5 * step)];
+    // Rounded times have steps of two lengths, one unit of the last digit apart; a step over missing frames is longer.
+    let decimals = rows
+        .iter()
+        .filter_map(|row| row.get(column)?.split_once(['.', ',']))
+        .map(|(_, after)| after.trim().len());
+    let unit = 0.1_f64.powi(decimals.max().unwrap_or(0) as i32);
+    let longest = (step + 1.5 * unit).max(1.5 * step);
+    let usual = &steps[..steps.partition_point(|other| *other < longest)];
     let mean = usual.iter().sum::<f64>() / usual.len() as f64;
     let name = simple(columns.get(column)?);
     let unit = ["timestamp", "time"].into_iter().find_map(|word| name.strip_prefix(word));
@@ -161,7 +167,9 @@ mod tests {
 
     #[test]
     fn rounded_times_have_the_rate_of_all_their_steps() {
-        for (column, rate, digits) in [("time", 30.0, 2), ("time", 60.0, 2), ("time_s", 60.0, 3)] {
+        for (column, rate, digits) in
+            [("time", 30.0, 2), ("time", 60.0, 2), ("time", 75.0, 2), ("time_s", 60.0, 3)]
+        {
             let rows: String =
                 (0..=300).map(|frame| format!("\n{:.digits$}", f64::from(frame) / rate)).collect();
             let (columns, rows) = records(&format!("{column}{rows}"));
