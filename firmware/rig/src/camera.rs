@@ -139,6 +139,7 @@ pub(crate) struct NoAnswer;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::StrobeEdges;
     use crate::settings::Settings;
 
     /// Whether an exposure is good whose signal begins and ends by so much too late and too early.
@@ -170,5 +171,39 @@ mod tests {
         let of_early = |early_us| answer(Micros(1_000_000), 0, early_us);
         // 200 ppm and 100 us.
         assert_eq!([0, 150, 300, 301].map(of_early), [Some(true), Some(true), Some(true), Some(false)]);
+    }
+
+    #[test]
+    fn of_a_camera_that_runs_freely_an_exposure_begun_before_it_was_awaited_is_ignored() {
+        let mut camera = Camera::new(Settings::DEFAULT.camera);
+        let number = camera.listen(BoardMicros(10_000));
+        let of_start = |start| {
+            let strobe = StrobeEdges { start: BoardMicros(start), end: BoardMicros(15_000) };
+            Inputs { strobe: Some(strobe), ..Inputs::idle(BoardMicros(15_100)) }
+        };
+        camera.sense(&of_start(9_999));
+        assert_eq!((camera.result(number), camera.is_listening()), (None, true));
+        camera.sense(&of_start(10_000));
+        let edges = ExposureEdges {
+            trigger: BoardMicros(10_000),
+            strobe_start: BoardMicros(10_000),
+            strobe_end: BoardMicros(15_000),
+            flash: None,
+        };
+        assert_eq!((camera.result(number), camera.is_listening()), (Some(Ok(edges)), false));
+        // Read-out of 10.5 ms.
+        assert_eq!([25_499, 25_500].map(|at| camera.is_ready(BoardMicros(at))), [false, true]);
+    }
+
+    #[test]
+    fn a_trigger_without_a_strobe_is_given_up_after_its_deadline_and_the_read_out_is_awaited() {
+        let mut camera = Camera::new(Settings::DEFAULT.camera);
+        let number = camera.trigger(Micros(2_000), None, BoardMicros(1_000));
+        // Exposure and 5 ms.
+        camera.sense(&Inputs::idle(BoardMicros(8_000)));
+        assert_eq!(camera.result(number), None);
+        camera.sense(&Inputs::idle(BoardMicros(8_001)));
+        assert_eq!(camera.result(number), Some(Err(NoAnswer)));
+        assert_eq!([18_499, 18_500].map(|at| camera.is_ready(BoardMicros(at))), [false, true]);
     }
 }

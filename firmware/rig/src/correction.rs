@@ -6,9 +6,7 @@ use farnear_maths::clsf::{
     Blend, Coefficient, Columns, Error, FULL_TERMS, Frame, Full, FullFit, REGION_TERMS, REGIONS,
     RegionCoefficients, RegionFit, Regions, TableState,
 };
-use farnear_protocol::message::{
-    CODES_MAX, Codes, CoefficientBits, CorrectionFault, CorrectionForm, CorrectionInfo,
-};
+use farnear_protocol::message::{Codes, CoefficientBits, CorrectionFault, CorrectionForm, CorrectionInfo};
 
 pub const ROW_PIXELS_MAX: u16 = 1024;
 /// Of the largest form.
@@ -228,9 +226,6 @@ impl Correction {
     pub(crate) fn get_row(&self, first: u16, count: u8) -> Result<Codes, CorrectionFault> {
         let open = self.open.as_ref().ok_or(CorrectionFault::None)?;
         let pixels = open.pixels(first, usize::from(count))?;
-        if pixels.len() > CODES_MAX {
-            return Err(CorrectionFault::Place);
-        }
         Codes::from_slice(&self.row[pixels]).map_err(|_| CorrectionFault::Place)
     }
 }

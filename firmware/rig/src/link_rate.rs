@@ -43,7 +43,7 @@ impl LinkSpeed {
         self.change = if to == self.now { Change::None } else { Change::Asked { to, at } };
     }
 
-    /// The new rate, when it changes. `said`: nothing is in transit at the old one; `requests`: valid ones so far.
+    /// The new rate, when it changes. `all_sent`: nothing is in transit at the old one; `requests`: valid ones so far.
     pub(crate) fn due(
         &mut self,
         now: BoardMicros,

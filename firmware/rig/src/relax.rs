@@ -29,4 +29,15 @@ mod tests {
             assert_eq!((before, code(from, to, FAST + 1, FAST)), (to, to));
         }
     }
+
+    #[test]
+    fn a_fast_ramp_has_smooth_ends_and_is_half_way_in_its_middle() {
+        for (from, to) in [(u16::MAX, 1), (100, 60_000)] {
+            let way = from.abs_diff(to);
+            let [first, last] = [1, FAST - 1].map(|at| code(from, to, at, FAST));
+            // 3 t^2 - 2 t^3 at a 22nd of the time is 0.6 % of the way; of a straight ramp it is 4.5 %.
+            assert!(from.abs_diff(first) < way / 100 && last.abs_diff(to) < way / 100, "{first} {last}");
+            assert!(code(from, to, FAST / 2, FAST).abs_diff(from.midpoint(to)) <= 1);
+        }
+    }
 }

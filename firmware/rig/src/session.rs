@@ -290,4 +290,29 @@ mod tests {
         assert!(session.send().is_some());
         assert_eq!(ask(&mut session, Request::Status), 3, "seven frames");
     }
+
+    #[test]
+    fn a_repeat_of_the_sessions_host_is_heard_and_another_host_is_not() {
+        let mut session = Session::new(7);
+        let ask = |session: &mut Session, number, request| {
+            let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id: 1, boot: 7 };
+            let call = Call { session: number, request };
+            let frame = frame::encode(header, &call).expect("every request fits");
+            frame::delimited(&frame).iter().for_each(|byte| session.receive(*byte));
+            let incoming = session.next_request();
+            let is_new = incoming.is_some();
+            if let Some(incoming) = incoming {
+                session.answer(incoming, Ok(Response::Accepted));
+                session.put_answer();
+            }
+            (is_new, session.heard())
+        };
+        assert_eq!(ask(&mut session, 5, Request::OpenSession), (true, 1));
+        assert_eq!(ask(&mut session, 5, Request::OpenSession), (false, 2), "a retry");
+        assert_eq!(ask(&mut session, 6, Request::OpenSession), (false, 2), "an old id");
+        assert_eq!(ask(&mut session, 6, Request::Status), (false, 2));
+        assert_eq!(ask(&mut session, 5, Request::Status), (false, 2), "the id of another request");
+        let counters = LinkCounters { frames: 5, bad_frames: 0, repeated: 1, stale: 2, overflowed: 0 };
+        assert_eq!(session.counters(), counters);
+    }
 }

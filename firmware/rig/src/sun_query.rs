@@ -151,5 +151,24 @@ mod tests {
         let flat = ShadowQuery { height_mm: 0, ..SHADOW };
         assert_eq!(answer(&SunQuery { shadow: Some(flat), ..QUERY }).shadow, Some(ShadowAnswer::Senseless));
         assert_eq!(answer(&SunQuery { shadow: None, ..QUERY }).shadow, None);
+        // Latitude and longitude below the sun, by PSA+ in double precision.
+        let below = SunQuery { latitude_e7: 234_350_267, longitude_e7: 454_370_291, ..QUERY };
+        assert_eq!(answer(&below).shadow, Some(ShadowAnswer::SunOverhead));
+    }
+
+    #[test]
+    fn a_shadow_towards_or_away_from_the_camera_has_an_unreliable_deviation() {
+        let deviations = QueryDeviations { azimuth_e7: 20_000_000, ..EXACT };
+        // The sun is 110.7 deg east of north; the camera looks against it or along its light.
+        for (azimuth_e7, distance_mm, expected) in [
+            (200_000_000, 8_000, ShadowReliability::FirstOrder),
+            (692_725_000, 8_000, ShadowReliability::EitherSide),
+            (-1_107_275_000, 1_700, ShadowReliability::ShadowNearCamera),
+        ] {
+            let shadow = ShadowQuery { azimuth_e7, distance_mm, lateral_mm: 0, deviations, ..SHADOW };
+            let found = answer(&SunQuery { shadow: Some(shadow), ..QUERY }).shadow;
+            let Some(ShadowAnswer::Angle { reliability, .. }) = found else { panic!("{found:?}") };
+            assert_eq!(reliability, expected, "{found:?}");
+        }
     }
 }

@@ -103,3 +103,56 @@ impl Works {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use farnear_protocol::message::Routine;
+
+    fn on_axis(request: u32, ms: u32, work: AxisWork) -> Option<Active<AxisWork>> {
+        Some(Active { request, silence: Micros(1_000 * ms), work })
+    }
+
+    #[test]
+    fn the_shortest_silence_of_any_work_that_is_not_ending_counts() {
+        let homes = || AxisWork::Home(Homing::new());
+        let mut works = Works::new();
+        assert_eq!(works.shortest_silence(), None);
+        *works.on(Axis::SensorCoarse) = on_axis(1, 300, homes());
+        *works.on(Axis::SensorFine) = on_axis(2, 200, homes());
+        *works.on(Axis::Lens) = on_axis(3, 400, homes());
+        assert_eq!(works.shortest_silence(), Some((2, Micros(200_000))));
+        // A braking axis needs no host.
+        works.end(Axis::SensorFine, Failure::Stopped);
+        assert_eq!(works.shortest_silence(), Some((1, Micros(300_000))));
+        let routine = Routine::Travel { axis: Axis::Lens };
+        let work = WholeWork::Calibration(Calibrating::new(routine).expect("a routine"));
+        works.whole = Some(Active { request: 4, silence: Micros(100_000), work });
+        assert_eq!(works.shortest_silence(), Some((4, Micros(100_000))));
+        works.end_whole(None, Failure::Stopped);
+        assert_eq!(works.shortest_silence(), Some((1, Micros(300_000))));
+    }
+
+    #[test]
+    fn the_first_failure_is_kept_and_replaces_a_stop() {
+        let ending = |works: &Works| match (&works.axes[Axis::Lens as usize], &works.whole) {
+            (
+                Some(Active { work: AxisWork::Ending(of_axis), .. }),
+                Some(Active { work: WholeWork::Ending { reason, .. }, .. }),
+            ) => (*of_axis, *reason),
+            other => panic!("{other:?}"),
+        };
+        let mut works = Works::new();
+        *works.on(Axis::Lens) = on_axis(3, 400, AxisWork::Home(Homing::new()));
+        let work = WholeWork::Ending { axis: None, reason: Failure::Stopped };
+        works.whole = Some(Active { request: 4, silence: Micros(0), work });
+        let (first, later) = (Failure::DriverFault, Failure::Alarm { number: 2 });
+        for (reason, expected) in
+            [(Failure::Stopped, Failure::Stopped), (first, first), (later, first), (Failure::Stopped, first)]
+        {
+            works.end(Axis::Lens, reason);
+            works.end_whole(None, reason);
+            assert_eq!(ending(&works), (expected, expected), "{reason:?}");
+        }
+    }
+}

@@ -100,7 +100,7 @@ fn step(noise: &mut Noise) -> Step {
             let high_um = if axis == Axis::SensorFine { 195.0 } else { 1_500.0 };
             (Deed::Move { axis, to_um: rounded(noise.between(-5.0, high_um)) }, 0.4)
         }
-        7..=9 => (Deed::Expose(program(noise)), 0.3),
+        7..=9 | 20..=22 => (Deed::Expose(program(noise)), 0.3),
         10 => {
             let (period_us, exposures) = (one_of(noise, &[0, 40_000, 60_000]), 2 + below(noise, 10) as u32);
             (Deed::Continuous { program: program(noise), period_us, exposures }, 0.4)
@@ -114,7 +114,6 @@ fn step(noise: &mut Noise) -> Step {
         15 => (Deed::Halt, 0.0),
         16 => (if below(noise, 2) == 0 { Deed::Pause } else { Deed::Resume }, 0.0),
         17 => (Deed::Clear, 0.0),
-        20..=22 => (Deed::Expose(program(noise)), 0.3),
         18 => (Deed::Wait { ms: rounded(over_orders(noise, 1.0, 500.0)) }, 0.0),
         _ if happens(noise, 0.5) => (Deed::Reboot, 0.0),
         _ => (Deed::Silent { ms: rounded(over_orders(noise, 10.0, 2_500.0)) }, 0.0),

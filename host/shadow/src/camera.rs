@@ -263,4 +263,48 @@ mod tests {
         assert_eq!(camera.project([0.0, -1.0, 0.0]), None);
         assert_eq!(camera.ground_point([0.0, -4000.0]), None);
     }
+
+    #[test]
+    fn each_number_out_of_its_range_is_named() {
+        type Change = fn(&mut CameraFile, f64);
+        let table: [(&str, f64, Change); 22] = [
+            ("camera.height_m", 0.0, |f, v| f.camera.height_m = v),
+            ("camera.azimuth_deg", 721.0, |f, v| f.camera.azimuth_deg = v),
+            ("camera.pitch_deg", 80.0, |f, v| f.camera.pitch_deg = v),
+            ("camera.pitch_deg", -80.0, |f, v| f.camera.pitch_deg = v),
+            ("camera.focal_length_mm", 2e3, |f, v| f.camera.focal_length_mm = v),
+            ("camera.pixel_um", 1e3, |f, v| f.camera.pixel_um = v),
+            ("camera.width_px", 0.0, |f, v| f.camera.width_px = v as usize),
+            ("camera.height_px", 0.0, |f, v| f.camera.height_px = v as usize),
+            ("subject.height_m", 3.0, |f, v| f.subject.height_m = v),
+            ("subject.height_m", 0.2, |f, v| f.subject.height_m = v),
+            ("subject.head_width_m", 0.02, |f, v| f.subject.head_width_m = v),
+            ("subject.distance_m", 0.2, |f, v| f.subject.distance_m = Some(v)),
+            ("standard_deviations.day", -1e-9, |f, v| f.standard_deviations.day = v),
+            ("standard_deviations.time_h", -1e-9, |f, v| f.standard_deviations.time_h = v),
+            ("standard_deviations.latitude_deg", -1e-9, |f, v| f.standard_deviations.latitude_deg = v),
+            ("standard_deviations.longitude_deg", -1e-9, |f, v| f.standard_deviations.longitude_deg = v),
+            ("standard_deviations.subject_height_m", -1e-9, |f, v| {
+                f.standard_deviations.subject_height_m = v
+            }),
+            ("standard_deviations.camera_height_m", -1e-9, |f, v| f.standard_deviations.camera_height_m = v),
+            ("standard_deviations.azimuth_deg", -1e-9, |f, v| f.standard_deviations.azimuth_deg = v),
+            ("standard_deviations.head_width_m", -1e-9, |f, v| f.standard_deviations.head_width_m = v),
+            ("standard_deviations.head_width_px", -1e-9, |f, v| f.standard_deviations.head_width_px = v),
+            ("standard_deviations.image_distance_um", -1e-9, |f, v| {
+                f.standard_deviations.image_distance_um = v
+            }),
+        ];
+        for (name, value, change) in table {
+            for wrong in [value, f64::NAN] {
+                let mut file = CameraFile::parse(TEXT).expect("valid");
+                change(&mut file, wrong);
+                let found = file.check();
+                assert!(matches!(found, Err(CameraError::Range { name: of, .. }) if of == name), "{found:?}");
+            }
+        }
+        let mut exact = CameraFile::parse(TEXT).expect("valid");
+        exact.standard_deviations.day = 0.0;
+        assert_eq!(exact.check(), Ok(()));
+    }
 }

@@ -214,4 +214,30 @@ mod tests {
         assert!((found - 7.0).abs() < 1e-9, "{found}");
         assert!((distance_from_head_m(&file, 0.17 * file.camera.focal_px() / 5.0) - 5.0).abs() < 1e-12);
     }
+
+    #[test]
+    fn the_silhouette_is_turned_by_the_shadows_direction_after_mirroring_to_the_right() {
+        for (m_px, beta_deg, mirrored) in [
+            ([2.0, 0.0], 135.0, false),
+            ([2.0, 2.0], 112.5, false),
+            ([2.0, -2.0], 157.5, false),
+            ([-2.0, 2.0], 112.5, true),
+            ([-2.0, -2.0], 157.5, true),
+            ([0.0, 3.0], 90.0, true),
+            ([0.0, -3.0], 180.0, true),
+        ] {
+            let image = ImageShadow::new([10.0, 20.0], m_px, 50.0, false);
+            assert!((image.beta_rad.to_degrees() - beta_deg).abs() < 1e-12, "{image:?}");
+            assert_eq!(image.mirrored, mirrored, "{image:?}");
+            assert_eq!(image.tip_px, [10.0 + m_px[0], 20.0 + m_px[1]]);
+        }
+    }
+
+    #[test]
+    fn a_sun_at_the_lowest_elevation_has_a_shadow() {
+        let of = |elevation_deg| {
+            on_ground(SunPosition { elevation_deg, azimuth_deg: 90.0 }, 1.75, &camera(0.0)).is_ok()
+        };
+        assert_eq!([f64::NAN, 2.999, LOWEST_SUN_DEG].map(of), [false, false, true]);
+    }
 }

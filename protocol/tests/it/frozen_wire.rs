@@ -93,3 +93,18 @@ fn camera_endpoint() {
     assert_eq!(free_run, [2, 0xa0, 0x9c, 1, 0x88, 0x27]);
     assert_eq!(FREE_RUNNING, u32::MAX);
 }
+
+#[test]
+fn a_camera_frame_has_pixels_of_8_to_16_bits() {
+    let header = FrameHeader { shot_id: 2, exposure: BoardMicros(5), width: 1, height: 1, bits: 8 };
+    for (header, good) in [
+        (header, true),
+        (FrameHeader { bits: 16, ..header }, true),
+        (FrameHeader { bits: 7, ..header }, false),
+        (FrameHeader { bits: 17, ..header }, false),
+        (FrameHeader { width: 0, ..header }, false),
+        (FrameHeader { height: 0, ..header }, false),
+    ] {
+        assert_eq!(FrameHeader::from_bytes(&header.to_bytes()), good.then_some(header));
+    }
+}

@@ -214,3 +214,24 @@ impl FullFit {
         self.sums.solve()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_samples_fill_the_sums_without_overflow_and_one_more_is_refused() {
+        const LARGEST: i64 = 1 << TERM_BITS;
+        for sign in [1, -1] {
+            let mut sums = Sums::<1>::new();
+            let before = MOST_SAMPLES - 1;
+            sums.samples = before;
+            sums.matrix[0][0] = i64::from(before) * LARGEST * LARGEST;
+            sums.right[0] = sign * i64::from(before) * LARGEST * LARGEST;
+            let (term, truth) = (LARGEST as i32, (sign * LARGEST) as i32);
+            assert_eq!(sums.add(&[term], truth), Ok(()));
+            assert_eq!(sums.add(&[term], truth), Err(Error::TooManySamples { most: 4_194_304 }));
+            assert_eq!(sums.solve().map(|[mean]| mean.to_bits()), Ok(sign as i32 * (1 << 29)));
+        }
+    }
+}

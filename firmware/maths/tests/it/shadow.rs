@@ -257,6 +257,75 @@ fn a_shadow_has_the_direction_that_one_expects() {
     assert!((west.length_m - 1.7 / elevation.to_radians().tan()).abs() < 1e-3);
 }
 
+/// A sun at this elevation and azimuth (clockwise from north).
+fn sun_at(elevation_deg: f64, azimuth_deg: f64) -> Sun {
+    let ((sin, cos), (east, north)) =
+        (elevation_deg.to_radians().sin_cos(), azimuth_deg.to_radians().sin_cos());
+    Sun { east: (cos * east) as f32, north: (cos * north) as f32, up: sin as f32 }
+}
+
+#[test]
+fn a_shadow_of_a_subject_off_the_axis_is_that_of_a_pinhole() {
+    const HC: f64 = 1.3;
+    let (mut in_front, mut behind) = (0, 0);
+    for (elevation, distance) in [(20.0_f64, 9.0_f64), (50.0, 4.0), (12.0, 3.0)] {
+        for lateral in [-2.5_f64, 0.8] {
+            for turn in 0..12 {
+                let (azimuth, camera) = (f64::from(turn) * 30.0 + 7.0, 25.0_f64);
+                let geometry = Geometry {
+                    azimuth: BinaryAngle::from_degrees(camera as f32),
+                    camera_height_m: HC as f32,
+                    distance_m: distance as f32,
+                    lateral_m: lateral as f32,
+                    height_m: HEIGHT_M as f32,
+                };
+                let shadow = Shadow::of(&sun_at(elevation, azimuth), &geometry).unwrap();
+                let length = HEIGHT_M / elevation.to_radians().tan();
+                // Away from the sun; the camera looks `camera` anticlockwise from north.
+                let (sin, cos) = (azimuth + 180.0 + camera).to_radians().sin_cos();
+                let (right, forward) = (length * sin, length * cos);
+                let end = distance + forward;
+                let mx = (lateral + right) / end - lateral / distance;
+                let my = HC * (1.0 / end - 1.0 / distance);
+                let eta = my.atan2(mx.abs()).to_degrees();
+                let case = format!("{elevation} {distance} {lateral} {azimuth}: {shadow:?}");
+                assert!((f64::from(shadow.eta_deg) - eta).abs() < 0.01, "{case}: {eta}");
+                assert!((f64::from(shadow.beta_deg) - (135.0 - eta / 2.0)).abs() < 0.01, "{case}");
+                assert_eq!(shadow.mirrored, mx < 0.0, "{case}");
+                assert!((f64::from(shadow.length_m) - length).abs() < 1e-3, "{case}");
+                assert!((f64::from(shadow.end_distance_m) - end).abs() < 1e-3, "{case}");
+                *(if end > 0.0 { &mut in_front } else { &mut behind }) += 1;
+            }
+        }
+    }
+    assert!(in_front > 30 && behind > 5, "{in_front} {behind}");
+}
+
+#[test]
+fn a_shadow_along_the_line_of_sight_may_be_on_either_side() {
+    let (time, place) = (CASES[1].time(), CASES[1].place());
+    let sun = Sun::at(time, &place);
+    for (off_deg, expected) in
+        [(0.0, Reliability::EitherSide), (0.5, Reliability::EitherSide), (90.0, Reliability::FirstOrder)]
+    {
+        // The shadow falls away from the camera, or this much to the right.
+        let azimuth = BinaryAngle::from_degrees(180.0 - sun.azimuth_deg() + off_deg);
+        let geometry = Geometry { azimuth, distance_m: 9.0, ..CASES[1].geometry() };
+        let shadow = Shadow::of(&sun, &geometry).unwrap();
+        let deviation = shadow.deviation(time, &place, &geometry, &CASES[1].deviations());
+        assert_eq!(deviation.reliability, expected, "{off_deg}: {shadow:?} {deviation:?}");
+    }
+}
+
+#[test]
+fn the_lowest_and_the_highest_sun_are_limited() {
+    let geometry = CASES[0].geometry();
+    let of = |elevation_deg| Shadow::of(&sun_at(elevation_deg, 200.0), &geometry);
+    assert!(matches!(of(2.99), Err(Error::SunTooLow { elevation_deg }) if elevation_deg > 2.98));
+    assert!(of(3.01).is_ok() && of(89.99).is_ok());
+    assert!(matches!(of(89.995), Err(Error::SunOverhead { .. })));
+}
+
 #[test]
 fn no_angle_without_a_shadow() {
     let place = place(50.0, 0.0);
@@ -269,9 +338,18 @@ fn no_angle_without_a_shadow() {
     assert!(matches!(Shadow::of(&broken, &geometry), Err(Error::SunTooLow { .. })));
     let noon = unix_seconds(2023, 6, 21, 12 * 3600);
     for value_m in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-        let flat = Geometry { distance_m: value_m, ..geometry };
-        let error = Shadow::at(noon, &place, &flat).unwrap_err();
-        assert!(error.to_string().contains("distance of the subject"), "{error}");
+        for (name, flat) in [
+            ("camera height", Geometry { camera_height_m: value_m, ..geometry }),
+            ("distance of the subject", Geometry { distance_m: value_m, ..geometry }),
+            ("height of the subject", Geometry { height_m: value_m, ..geometry }),
+        ] {
+            let error = Shadow::at(noon, &place, &flat).unwrap_err();
+            assert!(matches!(error, Error::Senseless { what, .. } if what == name), "{error}");
+        }
+    }
+    for lateral_m in [f32::NAN, f32::INFINITY] {
+        let error = Shadow::at(noon, &place, &Geometry { lateral_m, ..geometry }).unwrap_err();
+        assert!(matches!(error, Error::Senseless { what: "offset of the subject", .. }), "{error}");
     }
 }
 

@@ -209,3 +209,36 @@ fn set_off(phase: &Phase, stepper: &mut Stepper, numbers: &StepperSettings, piez
     };
     Leg::start(stepper, way, Purpose::SeekHome, until)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Gain and zero for contacts this far apart by gauge and encoder, nm; the old scale is 0.98 and 500 nm.
+    fn found(by_gauge: i64, by_encoder: i64, relaxed: i64) -> Option<(i32, i32)> {
+        let rounds = ROUNDS as i64;
+        let (gauge, encoder) = ([20_000 * rounds, (20_000 + by_gauge) * rounds], [0, -by_encoder * rounds]);
+        let mut settings = Settings::DEFAULT;
+        (settings.fine.gauge_gain_ppm, settings.fine.gauge_offset) = (980_000, Nanometres(500));
+        GaugeScale { gauge, encoder, relaxed, ..GaugeScale::new() }.evaluate(&settings)
+    }
+
+    #[test]
+    fn the_new_scale_corrects_the_old_one_within_plausible_limits() {
+        // The gauge shows 160 um where the screw moved by 152: 0.98 * 0.95. 98 nm are a reading of 100.
+        assert_eq!(found(160_000, 152_000, 98), Some((931_000, 600)));
+        assert_eq!(found(98_000, 110_000, -9_310), Some((1_100_000, -9_000)));
+        assert_eq!(found(98_000, 90_000, 8_330), Some((900_000, 9_000)));
+        for (by_gauge, by_encoder, relaxed) in [
+            (980_000, 1_100_001, 0),
+            (980_000, 899_999, 0),
+            (98_000, 98_000, -9_311),
+            (98_000, 98_000, 8_331),
+            (98_000, -98_000, 0),
+            (-98_000, -98_000, 0),
+            (0, 98_000, 0),
+        ] {
+            assert_eq!(found(by_gauge, by_encoder, relaxed), None, "{by_gauge} {by_encoder} {relaxed}");
+        }
+    }
+}

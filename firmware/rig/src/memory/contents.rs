@@ -233,14 +233,17 @@ mod tests {
         // A stored backlash of 0 is valid, unlike one unknown to the older firmware.
         let backlash = farnear_protocol::message::SettingKey::CoarseBacklashNm as usize;
         write[backlash] = 7_000;
+        // The last of the 25 of version 1.
+        write[24] = -500;
         for (version, kept) in [(1, KEYS), (2, KEYS), (2, backlash)] {
             let memory = of_version(version, kept, write);
             assert!(matches!(record::find(&memory, RecordName::Settings), Found::Good { sequence: 9, .. }));
             let restored = Restored::from(&memory, &Settings::DEFAULT).values;
-            let expected = if kept == KEYS { 7_000 } else { Values::DEFAULT.raw()[backlash] };
+            let default = *Values::DEFAULT.raw();
+            let expected = |index: usize, value| if index < kept { value } else { default[index] };
             assert_eq!(
-                (restored.raw()[0], restored.raw()[backlash]),
-                (48_000_000, expected),
+                [0, backlash, 24].map(|index| restored.raw()[index]),
+                [48_000_000, expected(backlash, 7_000), expected(24, -500)],
                 "{version} {kept}"
             );
         }
@@ -265,5 +268,42 @@ mod tests {
         let record = AlarmRecord { number: u32::MAX, boot: u32::MAX, time: BoardMicros(u64::MAX), alarm };
         assert_eq!(from_item(&item(Some(&record))), Some(record));
         assert_eq!(from_item::<Shot>(&item::<Shot>(None)), None);
+    }
+
+    /// A newer firmware reads what this one wrote: the places must not change.
+    #[test]
+    fn counters_and_moving_axes_have_their_places_in_the_memory() {
+        let counters = Counters {
+            boots: 0x0403_0201,
+            alarms: 0x0807_0605,
+            triggers: 0x1817_1615_1413_1211,
+            coarse_steps: 0x2827_2625_2423_2221,
+            lens_steps: 0x3837_3635_3433_3231,
+            homings: 0x0c0b_0a09,
+            repaired: 0x100f_0e0d,
+        };
+        let contents = Contents {
+            counters,
+            in_motion: 2,
+            alarms: &Alarms::new(),
+            values: &Values::DEFAULT,
+            shots: &Shots::new(),
+            correction: None,
+        };
+        let [first, second] = [0, 1].map(|index| contents.block(RecordName::Counters, index));
+        assert!(first[..16].iter().copied().eq(1u8..=16) && first[16] == 2 && first[17..] == [0u8; 15]);
+        let places = (0x11u8..=0x18).chain(0x21..=0x28).chain(0x31..=0x38).chain([0; 8]);
+        assert!(second.iter().copied().eq(places), "{second:x?}");
+        let mut memory = std::boxed::Box::new([0u8; MEMORY_BYTES]);
+        let header = record::header(RecordName::Counters, 9);
+        let mut checksum = record::Checksum::new(&header);
+        checksum.push(&first);
+        checksum.push(&second);
+        let at = record::address(RecordName::Counters, 1);
+        for (index, block) in [checksum.finish(header), first, second].iter().enumerate() {
+            memory[at + index * BLOCK..][..BLOCK].copy_from_slice(block);
+        }
+        let restored = Restored::from(&memory, &Settings::DEFAULT);
+        assert_eq!((restored.counters, restored.in_motion), (counters, 2));
     }
 }

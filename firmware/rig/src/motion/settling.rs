@@ -79,4 +79,20 @@ mod tests {
         assert!(push(0));
         assert_eq!(settling.mean(), Nanometres(1_000));
     }
+
+    #[test]
+    fn the_dwell_is_at_least_as_long_as_requested_and_the_window_is_the_same_on_both_sides() {
+        for (dwell_us, samples) in [(0, 2), (1, 2), (200, 2), (201, 3), (2_001, 12)] {
+            let mut settling = Settling::new(Settle { window: Nanometres(50), dwell: Micros(dwell_us) });
+            for sample in 1..=samples {
+                assert!(!settling.is_settled(), "{dwell_us} us after {} samples", sample - 1);
+                settling.push(Nanometres(0), Nanometres(0));
+            }
+            assert!(settling.is_settled(), "{dwell_us} us after {samples} samples");
+            for outside in [-51, i32::MIN] {
+                settling.push(Nanometres(outside), Nanometres(0));
+                assert!(!settling.is_settled(), "{outside}");
+            }
+        }
+    }
 }

@@ -420,3 +420,19 @@ fn a_setting_changed_under_the_closed_loop_makes_no_jump() {
         assert!((plant.position - 180e3).abs() < 50.0, "{} nm", plant.position);
     }
 }
+
+#[test]
+fn a_gauge_has_failed_after_more_than_five_lost_conversions_and_at_both_ends_of_its_range() {
+    let mut piezo = Piezo::new(Settings::DEFAULT.fine);
+    for (code, nm) in [(1, -9_999), (GAUGE_CODE_MAX - 1, 252_142)] {
+        piezo.sense(Some(code));
+        assert_eq!((piezo.measured(), piezo.gauge_fresh()), (Nanometres(nm), true));
+        for silent in [None, Some(0), Some(GAUGE_CODE_MAX), None, None] {
+            piezo.sense(silent);
+            assert!(!piezo.gauge_fresh() && !piezo.gauge_failed(), "{silent:?}");
+        }
+        piezo.sense(None);
+        assert!(piezo.gauge_failed());
+        assert_eq!(piezo.measured(), Nanometres(nm), "the last one");
+    }
+}

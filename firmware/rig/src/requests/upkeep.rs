@@ -25,14 +25,12 @@ impl Rig {
     }
 
     pub(super) fn set_link_rate(&mut self, rate: LinkRate, now: BoardMicros) -> Answer {
-        self.must_stand()?;
         self.all_must_be_free()?;
         self.link_speed.ask(rate, now);
         Ok(Response::Accepted)
     }
 
     pub(super) fn write_setting(&mut self, key: SettingKey, value: i32) -> Answer {
-        self.must_stand()?;
         self.all_must_be_free()?;
         self.values.set(key, value).map_err(RequestError::SettingRange)?;
         self.apply_settings();

@@ -65,6 +65,11 @@ mod tests {
         assert!(ids.is_new(14), "never was");
         ids.begin(200);
         assert!(!ids.is_new(199) && !ids.is_new(14), "of a session before");
+        // A session may be opened with a late id.
+        ids.take(205);
+        ids.begin(203);
+        assert_eq!(ids.last(), 205);
+        assert!((200..=205).all(|id| !ids.is_new(id)) && ids.is_new(206));
     }
 
     #[test]

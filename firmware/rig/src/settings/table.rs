@@ -242,4 +242,69 @@ mod tests {
             (47_000_000, 1_000)
         );
     }
+
+    #[test]
+    fn stored_limits_that_exclude_each_other_become_the_defaults_of_their_axis() {
+        use SettingKey::{CoarseMaxNm, FineMaxNm, FineMinNm, LensMaxNm, LensMinNm};
+        for (low, high) in Axis::ALL.map(limit_keys) {
+            let mut raw = *Values::DEFAULT.raw();
+            (raw[CoarseMaxNm as usize], raw[LensMinNm as usize]) = (12_000_000, 100_000);
+            (raw[LensMaxNm as usize], raw[FineMinNm as usize]) = (11_000_000, 6_000);
+            raw[FineMaxNm as usize] = 190_000;
+            let mut expected = raw;
+            (raw[low as usize], raw[high as usize]) = (100_001, 100_000);
+            for key in [low, high] {
+                expected[key as usize] = range(key).0;
+            }
+            assert_eq!(Values::restored(raw).raw(), &expected, "{low:?}");
+            // Equal limits leave one position.
+            (raw[low as usize], raw[high as usize]) = (100_000, 100_000);
+            assert_eq!(Values::restored(raw).raw(), &raw, "{low:?}");
+        }
+    }
+
+    #[test]
+    fn each_setting_changes_its_own_number() {
+        use SettingKey::*;
+        type Change = fn(&mut Settings);
+        let table: [(SettingKey, i32, Change); SettingKey::ALL.len()] = [
+            (DatumNm, 48_000_001, |s| s.datum = Nanometres(48_000_001)),
+            (DistanceMinNm, 46_000_001, |s| s.distance_min = Nanometres(46_000_001)),
+            (CoarseMinNm, 1_001, |s| s.coarse.min = Nanometres(1_001)),
+            (CoarseMaxNm, 12_000_001, |s| s.coarse.max = Nanometres(12_000_001)),
+            // A pulse is 156.25 nm.
+            (CoarseSpeedNmPerS, 5_000_000, |s| s.coarse.speed = 32_000),
+            (CoarseAccelerationUmPerS2, 100_000, |s| s.coarse.acceleration = 640_000),
+            (CoarseJerkUmPerS3, 3_200_000, |s| s.coarse.jerk = 20_480_000),
+            (CoarseBacklashNm, 7_001, |s| s.coarse.backlash = Nanometres(7_001)),
+            (CoarseFollowingNm, 8_001, |s| s.coarse.following = Nanometres(8_001)),
+            (LensMinNm, 1_002, |s| s.lens.min = Nanometres(1_002)),
+            (LensMaxNm, 12_000_002, |s| s.lens.max = Nanometres(12_000_002)),
+            (LensSpeedNmPerS, 5_000_000, |s| s.lens.speed = 32_000),
+            (LensAccelerationUmPerS2, 100_000, |s| s.lens.acceleration = 640_000),
+            (LensJerkUmPerS3, 3_200_000, |s| s.lens.jerk = 20_480_000),
+            (LensBacklashNm, 7_002, |s| s.lens.backlash = Nanometres(7_002)),
+            (LensFollowingNm, 8_002, |s| s.lens.following = Nanometres(8_002)),
+            (FineMinNm, 6_001, |s| s.fine.min = Nanometres(6_001)),
+            (FineMaxNm, 190_001, |s| s.fine.max = Nanometres(190_001)),
+            (PiezoGainPmPerCode, 3_001, |s| s.fine.gain_pm_per_code = 3_001),
+            (PiezoHysteresisPpm, 120_001, |s| s.fine.hysteresis_ppm = 120_001),
+            (PiezoCreepPpmPerDecade, 15_001, |s| s.fine.creep_ppm_per_decade = 15_001),
+            (CameraReadoutUs, 20_001, |s| s.camera.readout = Micros(20_001)),
+            (StrobeDeadlineUs, 6_001, |s| s.camera.strobe_deadline = Micros(6_001)),
+            (GaugeGainPpm, 1_010_001, |s| s.fine.gauge_gain_ppm = 1_010_001),
+            (GaugeOffsetNm, -501, |s| s.fine.gauge_offset = Nanometres(-501)),
+            (PiezoSecondMode, 1, |s| {
+                (s.fine.gains, s.fine.dwell_min) = (s.fine.gentle_gains, Micros(10_000));
+            }),
+        ];
+        for (key, value, change) in table {
+            let (mut values, mut expected) = (Values::DEFAULT, Settings::DEFAULT);
+            values.set(key, value).expect("within its range");
+            change(&mut expected);
+            assert_ne!(expected, Settings::DEFAULT, "{key:?}");
+            assert_eq!(Settings::DEFAULT.with(&values), expected, "{key:?}");
+        }
+        assert_eq!(table.map(|(key, ..)| key), SettingKey::ALL);
+    }
 }

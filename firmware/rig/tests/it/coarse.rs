@@ -2,7 +2,9 @@
 
 use crate::bench::motor::MotorFaults as Faults;
 use crate::bench::{self, Bench, SILENCE, failure};
-use farnear_protocol::message::{Alarm, Axis, EventKind, Failure, PositionState, SettingKey};
+use farnear_protocol::message::{
+    Alarm, Axis, EventKind, Failure, LinkRate, PositionState, Routine, SettingKey, StepperKeys,
+};
 use farnear_protocol::{Nanometres, Request, RequestError};
 use proptest::prelude::*;
 
@@ -89,6 +91,89 @@ fn limits_are_refused_and_never_clamped() {
 }
 
 #[test]
+fn each_axis_has_its_own_limits() {
+    for axis in Axis::ALL {
+        let mut bench = Bench::both_homed();
+        let before = bench.hello().limits;
+        let (low, high) = StepperKeys::of(axis)
+            .map_or((SettingKey::FineMinNm, SettingKey::FineMaxNm), |keys| (keys.min, keys.max));
+        for (key, value) in [(low, 20_000), (high, 150_000)] {
+            bench.ask(&Request::WriteSetting { key, value }).1.expect("in range");
+        }
+        let after = bench.hello().limits;
+        for other in Axis::ALL {
+            let own = (Nanometres(20_000), Nanometres(150_000));
+            let expected = if other == axis { own } else { before.of(other) };
+            assert_eq!(after.of(other), expected, "{other:?} after {axis:?}");
+            for asked in [expected.0.0 - 1, expected.1.0 + 1] {
+                let (asked, (min, max)) = (Nanometres(asked), expected);
+                let refused = Err(RequestError::OutOfRange { axis: other, asked, min, max });
+                assert_eq!(bench.ask(&bench::go(other, asked.0)).1, refused);
+            }
+        }
+        for end in [20_000, 150_000] {
+            assert!(matches!(bench.work(&bench::go(axis, end)), EventKind::MoveDone { .. }), "{axis:?}");
+        }
+    }
+}
+
+#[test]
+fn the_smallest_distance_itself_is_allowed() {
+    let mut bench = Bench::new(700.0);
+    bench.work(&bench::go(Axis::SensorFine, 150_000));
+    let limit = |bench: &mut Bench, value| {
+        let setting = Request::WriteSetting { key: SettingKey::DistanceMinNm, value };
+        bench.ask(&setting).1.expect("in range");
+    };
+    limit(&mut bench, 1_000_000_000);
+    let back = bench::go(Axis::SensorFine, 20_000);
+    let refused = bench.ask(&back).1;
+    let Err(RequestError::TooClose { distance, .. }) = refused else { panic!("{refused:?}") };
+    limit(&mut bench, distance.0 + 1);
+    let min = Nanometres(distance.0 + 1);
+    assert_eq!(bench.ask(&back).1, Err(RequestError::TooClose { distance, min }));
+    limit(&mut bench, distance.0);
+    assert!(matches!(bench.work(&back), EventKind::MoveDone { .. }));
+}
+
+#[test]
+fn the_first_pulse_waits_until_the_driver_has_tuned_its_current_and_later_ones_do_not() {
+    let mut bench = Bench::new(300.0);
+    let mut first_pulse_us = |request: &Request| {
+        let id = bench.accepted(request);
+        let (edges, start) = (bench.hardware.coarse.edges, bench.now);
+        while bench.hardware.coarse.edges == edges {
+            bench.tick();
+        }
+        let waited = bench.now - start;
+        bench.end_of(id);
+        waited
+    };
+    // 130 ms and 10 ms by its data sheet; the first pulse takes up to a millisecond.
+    let first = first_pulse_us(&HOME);
+    assert!((140_000..145_000).contains(&first), "{first} us");
+    let later = first_pulse_us(&go(100_000));
+    assert!(later < 20_000, "{later} us");
+}
+
+#[test]
+fn a_stage_3_um_off_its_target_has_not_settled_after_half_a_second() {
+    for (microsteps, sign) in [(20, -1), (-20, 1)] {
+        let mut bench = Bench::homed();
+        let id = bench.accepted(&go(2_000_000));
+        bench.run_ms(300);
+        // 3.1 um: less than a stall, more than the window of 1 um.
+        bench.hardware.coarse.turn(microsteps);
+        let Failure::NotSettled { error } = failure(&bench.end_of(id)) else { panic!("{microsteps}") };
+        // Target minus measured.
+        assert!((2_800..3_450).contains(&(sign * error.0)), "{microsteps}: {error:?}");
+        let waited = bench.now as f64 - bench.hardware.coarse.last_edge_us;
+        assert!((502_000.0..506_000.0).contains(&waited), "{waited} us");
+        assert_eq!((bench.alarm(), bench.status().coarse.state), (None, PositionState::Homed));
+    }
+}
+
+#[test]
 fn the_whole_travel_takes_2_24_seconds_at_40_khz() {
     let mut bench = Bench::homed();
     let (edges, start) = (bench.hardware.coarse.edges, bench.now);
@@ -134,7 +219,15 @@ fn a_second_work_is_refused_while_the_first_runs() {
     let mut bench = Bench::homed();
     let request = bench.accepted(&go(5_000_000));
     bench.run_ms(10);
-    for second in [go(1), HOME, Request::RunProgram { silence: SILENCE }] {
+    let (key, rate) = (SettingKey::CoarseSpeedNmPerS, LinkRate::Baud921600);
+    for second in [
+        go(1),
+        HOME,
+        Request::RunProgram { silence: SILENCE },
+        Request::Calibrate { routine: Routine::Travel { axis: Axis::Lens }, silence: SILENCE },
+        Request::WriteSetting { key, value: 1_000_000 },
+        Request::SetLinkRate { rate },
+    ] {
         assert_eq!(bench.ask(&second).1, Err(RequestError::Busy { request }));
     }
     assert!(matches!(bench.end_of(request), EventKind::MoveDone { .. }));

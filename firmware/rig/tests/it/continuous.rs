@@ -202,6 +202,8 @@ fn a_pace_faster_than_the_camera_and_a_cycle_that_ends_too_close_are_refused() {
     pair(&mut bench);
     let min = Micros(EXPOSURE + 10_500);
     assert_eq!(bench.ask(&run(15_499, 0)).1, Err(RequestError::Period { min }));
+    let end = bench.work(&run(15_500, 1));
+    assert!(matches!(end, EventKind::ContinuousDone { exposures: 1, .. }), "{end:?}");
     // Each shot is possible once; in the second round the coarse stage would hit the lens.
     let key = SettingKey::DistanceMinNm;
     assert!(matches!(

@@ -3,9 +3,9 @@
 use crate::bench::motor::MotorFaults;
 use crate::bench::{self, Bench, SILENCE, ends, go, home};
 use farnear_protocol::message::{
-    Alarm, Axis, EventKind, Failure, PositionState, ResetCause, Routine, SettingKey,
+    Alarm, Axis, EventKind, Failure, PositionState, ResetCause, Routine, SettingKey, Shot, TriggerMode,
 };
-use farnear_protocol::{BoardMicros, Request, RequestError};
+use farnear_protocol::{BoardMicros, Micros, Nanometres, Request, RequestError};
 use farnear_rig::{Identity, Rig};
 use proptest::prelude::*;
 
@@ -207,6 +207,88 @@ proptest! {
         }
         works_again(&mut bench)?;
     }
+}
+
+#[test]
+fn power_lost_in_any_kind_of_motion_is_known_and_on_its_axis_only() {
+    let (coarse, lens) = (Axis::SensorCoarse, Axis::Lens);
+    let program = Request::RunProgram { silence: SILENCE };
+    let travel = |axis| Request::Calibrate { routine: Routine::Travel { axis }, silence: SILENCE };
+    for (axis, request) in [
+        (coarse, home(coarse)),
+        (coarse, travel(coarse)),
+        (lens, home(lens)),
+        (lens, travel(lens)),
+        (lens, go(lens, 3_000_000)),
+        (lens, program),
+    ] {
+        let mut bench = Bench::both_homed();
+        bench.accepted(&Request::LoadShot { index: 0, shot: on_lens(3_000_000) });
+        bench.accepted(&Request::ArmProgram { shots: 1 });
+        bench.run_ms(50);
+        bench.accepted(&request);
+        bench.run_ms(30);
+        bench.restart(1, ResetCause::PowerOn);
+        assert_eq!(bench.alarm(), Some(Alarm::MotionInterrupted { axis }), "{request:?}");
+        bench.clear();
+        assert_eq!(bench.alarm(), None, "{request:?}: the other axis was at rest");
+        let status = bench.status();
+        let states = [status.coarse.state, status.lens.state];
+        let expected =
+            [coarse, lens].map(|of| if of == axis { PositionState::Lost } else { PositionState::Unknown });
+        assert_eq!(states, expected, "{request:?}");
+    }
+}
+
+const fn on_lens(nm: i32) -> Shot {
+    Shot {
+        axis: Axis::Lens,
+        target: Nanometres(nm),
+        exposure: Micros(1_000),
+        settle_window: Nanometres(1_000),
+        settle_dwell: Micros(2_000),
+        repeat: 1,
+        mode: TriggerMode::Hardware,
+    }
+}
+
+#[test]
+fn the_status_shows_each_switch_and_input_in_its_place() {
+    type Close = fn(&mut Bench);
+    let inputs: [Close; 6] = [
+        |bench| bench.hardware.coarse.faults.home_switch = Some(true),
+        |bench| bench.hardware.coarse.faults.far_switch = Some(true),
+        |bench| bench.hardware.lens.faults.home_switch = Some(true),
+        |bench| bench.hardware.lens.faults.far_switch = Some(true),
+        |bench| bench.hardware.faults.emergency_stop = true,
+        |bench| bench.hardware.faults.supply_low = true,
+    ];
+    for (index, close) in inputs.into_iter().enumerate() {
+        let mut bench = Bench::new(700.0);
+        bench.run_ms(2);
+        close(&mut bench);
+        bench.run_ms(2);
+        let status = bench.status();
+        let [coarse, lens] = [Axis::SensorCoarse, Axis::Lens].map(|axis| status.switches(axis));
+        let shown = [coarse, lens, [status.emergency_stop, status.supply_low]].concat();
+        let expected: Vec<bool> = (0..6).map(|place| place == index).collect();
+        assert_eq!(shown, expected);
+    }
+}
+
+#[test]
+fn a_sinking_supply_lowers_the_piezo_in_the_time_that_is_left() {
+    let mut bench = Bench::new(700.0);
+    bench.work(&go(Axis::SensorFine, 150_000));
+    bench.hardware.faults.supply_low = true;
+    // 4.4 ms.
+    for tick in 0..22 {
+        assert!(bench.hardware.dac > 0, "{tick}");
+        bench.tick();
+    }
+    assert_eq!(bench.hardware.dac, 0);
+    bench.run_ms(20);
+    assert_eq!(bench.hardware.dac, 0, "it stays relaxed");
 }
 
 #[test]

@@ -291,6 +291,7 @@ fn nothing_acts_twice_however_hostile_the_link() {
         }
     }
     honest_host(&mut bench, &mut ledger, &mut enemy);
+    assert!(hosts > 0 && resets > 0, "{hosts} honest hosts, {resets} resets");
     println!(
         "{} hostile frames, {hosts} honest hosts, {resets} resets, {} alarms",
         enemy.sent, ledger.alarms

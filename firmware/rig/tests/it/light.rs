@@ -50,6 +50,26 @@ fn lights_go_off_after_their_time() {
 }
 
 #[test]
+fn each_output_alone_obeys_its_time_the_silence_and_an_alarm() {
+    for levels in [LightLevels { first: 1, second: 0 }, LightLevels { first: 0, second: 1 }] {
+        for (time, silence) in [(SECOND, SILENCE), (LIGHT_TIME_MAX, SECOND)] {
+            let mut bench = Bench::new(700.0);
+            bench.accepted(&lights(levels, time, silence));
+            bench.run_ms(998);
+            assert_eq!(bench.hardware.lights, levels);
+            bench.run_ms(4);
+            assert_eq!(bench.hardware.lights, LightLevels::OFF, "{levels:?} {time:?} {silence:?}");
+        }
+        let mut bench = Bench::new(700.0);
+        let refused = bench.ask(&lights(levels, Micros(0), SILENCE)).1;
+        assert_eq!(refused, Err(RequestError::Light { reason: LightFault::Time }), "{levels:?}");
+        bench.accepted(&Request::Halt);
+        let refused = bench.ask(&lights(levels, SECOND, SILENCE)).1;
+        assert!(matches!(refused, Err(RequestError::Alarm { .. })), "{levels:?}: {refused:?}");
+    }
+}
+
+#[test]
 fn lights_go_off_when_the_host_is_silent() {
     let mut bench = Bench::new(700.0);
     bench.accepted(&lights(ON, LIGHT_TIME_MAX, SECOND));
@@ -123,7 +143,9 @@ fn light_that_is_too_bright_too_long_or_outside_the_exposure_is_refused() {
     let mut bench = Bench::new(700.0);
     let bright = LightLevels { first: 0, second: 1_001 };
     let refused = |reason| Err(RequestError::Light { reason });
-    assert_eq!(bench.ask(&lights(bright, SECOND, SILENCE)).1, refused(LightFault::Level));
+    for levels in [bright, LightLevels { first: 1_001, second: 0 }] {
+        assert_eq!(bench.ask(&lights(levels, SECOND, SILENCE)).1, refused(LightFault::Level), "{levels:?}");
+    }
     for time in [Micros(0), Micros(LIGHT_TIME_MAX.0 + 1)] {
         assert_eq!(bench.ask(&lights(ON, time, SILENCE)).1, refused(LightFault::Time));
     }
@@ -143,5 +165,7 @@ fn light_that_is_too_bright_too_long_or_outside_the_exposure_is_refused() {
     for (index, light, reason) in cases {
         assert_eq!(bench.ask(&flash(index, light)).1, refused(reason), "{light:?}");
     }
+    // It may end with the exposure.
+    bench.accepted(&flash(0, ShotLight { length: Micros(4_000), ..FLASH }));
     assert_eq!(bench.hardware.lights, LightLevels::OFF);
 }

@@ -161,6 +161,29 @@ fn a_repeated_correction_acts_once() {
     assert_eq!(row[0], 4_096, "an eighth once, not twice");
 }
 
+/// The rows' table is kept from one row to the next while the coefficients stay.
+#[test]
+fn a_row_is_corrected_with_the_coefficients_that_are_open_now() {
+    let mut bench = Bench::new(700.0);
+    let codes: Vec<i16> = (0..WIDTH as i16).map(|column| 150 * column - 12_000).collect();
+    let mut next = numbers(5);
+    let mut draw = |form: CorrectionForm| (0..form.coefficients()).map(|_| next() / 8).collect::<Vec<i32>>();
+    for form in [CorrectionForm::Regions, CorrectionForm::Blend, CorrectionForm::Full] {
+        let [kept, other] = [(); 2].map(|()| draw(form));
+        let [by_kept, by_other] = [&kept, &other].map(|bits| reference(form, bits, 7, &codes));
+        assert_ne!(by_kept, by_other);
+        // Opened behind a row of the form before.
+        bench.accepted(&Request::OpenCorrection(info(form)));
+        put_coefficients(&mut bench, &kept);
+        bench.accepted(&Request::StoreCorrection);
+        assert_eq!(correct(&mut bench, 7, &codes), by_kept, "{form:?}: opened");
+        put_coefficients(&mut bench, &other);
+        assert_eq!(correct(&mut bench, 7, &codes), by_other, "{form:?}: other coefficients");
+        bench.ask(&Request::LoadCorrection).1.expect("one is stored");
+        assert_eq!(correct(&mut bench, 7, &codes), by_kept, "{form:?}: loaded");
+    }
+}
+
 #[test]
 fn impossible_requests_are_rejected_with_a_reason() {
     let mut bench = Bench::new(700.0);
@@ -171,11 +194,17 @@ fn impossible_requests_are_rejected_with_a_reason() {
         let info = CorrectionInfo { width, height, ..info(CorrectionForm::Full) };
         assert_eq!(bench.ask(&Request::OpenCorrection(info)).1, fault(CorrectionFault::Size));
     }
+    for half_span_um in [0, -1] {
+        let info = CorrectionInfo { half_span_um, ..info(CorrectionForm::Full) };
+        assert_eq!(bench.ask(&Request::OpenCorrection(info)).1, fault(CorrectionFault::Size));
+    }
     bench.accepted(&Request::OpenCorrection(info(CorrectionForm::Full)));
     assert_eq!(bench.ask(&Request::SolveFit).1, fault(CorrectionFault::Underdetermined));
     assert_eq!(bench.ask(&Request::CorrectRow { row: HEIGHT }).1, fault(CorrectionFault::Place));
     let beyond = Request::PutRow { first: WIDTH - 1, codes: Codes::from_slice(&[1, 2]).expect("two fit") };
     assert_eq!(bench.ask(&beyond).1, fault(CorrectionFault::Place));
+    let too_many = Request::GetRow { first: 0, count: CODES_MAX as u8 + 1 };
+    assert_eq!(bench.ask(&too_many).1, fault(CorrectionFault::Place));
     let bits = |bits: &[i32]| CoefficientBits::from_slice(bits).expect("they fit");
     for (first, bits) in [(19, bits(&[1, 2])), (0, bits(&[i32::MIN]))] {
         assert_eq!(

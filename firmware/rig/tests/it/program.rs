@@ -2,7 +2,8 @@
 
 use crate::bench::{self, AFTER_START_MS, Bench, SILENCE};
 use farnear_protocol::message::{
-    Axis, EventKind, Failure, PositionState, ProgramState, Shot, ShotFault, ShotRecord, TriggerMode,
+    Axis, EventKind, Failure, PositionState, ProgramState, SettingKey, Shot, ShotFault, ShotRecord,
+    TriggerMode,
 };
 use farnear_protocol::{Micros, Nanometres, Request, RequestError};
 
@@ -75,6 +76,21 @@ fn the_piezo_moves_without_homing_and_settles_in_15_ms() {
 }
 
 #[test]
+fn with_a_second_mode_the_piezo_stays_in_its_window_for_10_ms_before_it_has_settled() {
+    let mut bench = Bench::new(700.0);
+    for (second_mode, us) in [(0, 2_000..4_000), (1, 10_000..20_000)] {
+        let key = SettingKey::PiezoSecondMode;
+        bench.ask(&Request::WriteSetting { key, value: second_mode }).1.expect("in range");
+        bench.work(&fine(FAR));
+        bench.run_ms(100);
+        let start = bench.now;
+        // It is there.
+        bench.work(&fine(FAR));
+        assert!(us.contains(&(bench.now - start)), "{second_mode}: {} us", bench.now - start);
+    }
+}
+
+#[test]
 fn a_pair_takes_at_most_60_ms_plus_its_exposures() {
     let mut bench = Bench::homed();
     load(&mut bench, &[shot(FAR), shot(NEAR)]);
@@ -84,6 +100,7 @@ fn a_pair_takes_at_most_60_ms_plus_its_exposures() {
         let us = bench.now - start;
         assert!(matches!(end, EventKind::ProgramDone { exposures: 2, .. }), "{end:?}");
         assert!(us <= 60_000 + 10_000, "{us} us with two exposures of 5 ms");
+        assert_eq!(taken.len(), 2);
         for (record, (index, target)) in taken.iter().zip([(0, FAR), (1, NEAR)]) {
             assert_eq!((record.index, record.asked), (index, Nanometres(target)));
             assert_eq!(record.trigger_number, round * 2 + u32::from(index));
@@ -123,14 +140,20 @@ fn the_camera_is_given_its_read_out_time() {
 }
 
 #[test]
-fn sixty_four_shots_on_both_axes_run_in_order() {
-    let mut bench = Bench::homed();
+fn sixty_four_shots_on_three_axes_run_in_order() {
+    let mut bench = Bench::both_homed();
     let shots: Vec<Shot> = (0..64)
         .map(|i| match i % 4 {
             0 => Shot {
                 axis: Axis::SensorCoarse,
                 target: Nanometres(500_000 + 20_000 * i),
                 settle_window: Nanometres(500),
+                ..shot(0)
+            },
+            1 => Shot {
+                axis: Axis::Lens,
+                target: Nanometres(900_000 + 10_000 * i),
+                settle_window: Nanometres(1_000),
                 ..shot(0)
             },
             _ => shot(FAR + 2_000 * i),
@@ -142,8 +165,14 @@ fn sixty_four_shots_on_both_axes_run_in_order() {
     assert_eq!(taken.len(), 64);
     for (record, shot) in taken.iter().zip(&shots) {
         assert_eq!((record.axis, record.asked), (shot.axis, shot.target));
-        let there = if shot.axis == Axis::SensorCoarse { record.coarse } else { record.fine };
+        let there = record.measured(shot.axis);
         assert!((there.0 - shot.target.0).abs() <= shot.settle_window.0, "{record:?}");
+    }
+    // Each record has the positions of all axes.
+    for four in taken.chunks(4) {
+        let [coarse, lens, .., fine] = four else { panic!("{four:?}") };
+        assert!((fine.coarse.0 - coarse.asked.0).abs() <= 500, "{fine:?}");
+        assert!((fine.lens.0 - lens.asked.0).abs() <= 1_000, "{fine:?}");
     }
 }
 
@@ -326,6 +355,7 @@ fn of_a_camera_that_runs_freely_the_first_frame_after_settling_counts() {
     bench.hardware.free_running = Some((33_333, 8_000));
     let (taken, end) = run(&mut bench, 2);
     assert!(matches!(end, EventKind::ProgramDone { exposures: 2, .. }), "{end:?}");
+    assert_eq!(taken.len(), 2);
     for record in &taken {
         assert_eq!(record.strobe_start.0 % 33_333, 0, "its own time");
         assert!(record.strobe_start >= record.trigger, "begun after the position was settled");

@@ -259,17 +259,20 @@ fn settings_shots_and_counters_survive() {
         other => panic!("{other:?}"),
     };
     let before = counters(&mut bench);
-    assert_eq!((before.homings, before.coarse_steps), (2, bench.hardware.coarse.edges));
+    let edges = [bench.hardware.coarse.edges, bench.hardware.lens.edges];
+    assert_eq!((before.homings, [before.coarse_steps, before.lens_steps]), (2, edges));
     bench.restart(1, ResetCause::PowerOn);
     assert_eq!(bench.hello().limits.coarse_max, Nanometres(6_000_000));
     let after = counters(&mut bench);
-    assert_eq!((after.homings, after.coarse_steps, after.boots), (2, before.coarse_steps, before.boots + 1));
+    assert_eq!((after.homings, [after.coarse_steps, after.lens_steps]), (2, edges));
+    assert_eq!((after.boots, after.triggers), (before.boots + 1, 0));
     let beyond = bench.ask(&go(Axis::SensorCoarse, 6_000_001)).1;
     assert!(matches!(beyond, Err(RequestError::OutOfRange { .. })), "{beyond:?}");
     bench.work(&home(Axis::Lens));
     bench.accepted(&Request::ArmProgram { shots: 1 });
     let end = bench.work(&Request::RunProgram { silence: bench::SILENCE });
     assert!(matches!(end, EventKind::ProgramDone { exposures: 3, .. }), "{end:?}");
+    assert_eq!(counters(&mut bench).triggers, 3);
 }
 
 #[test]

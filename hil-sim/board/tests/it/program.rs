@@ -154,7 +154,9 @@ fn free_running_uses_the_first_exposure_after_settling() {
     let end = bench.run();
     assert!(matches!(end, EventKind::ProgramDone { exposures: 2, .. }), "{end:?}");
     let shots = bench.rig.take_shots();
-    for record in records(&bench) {
+    let records = records(&bench);
+    assert_eq!(records.len(), 2);
+    for record in records {
         let shot = shots.iter().find(|shot| record.strobe_start.0.abs_diff(shot.board_us) <= 1);
         let shot = shot.unwrap_or_else(|| panic!("no exposure of the camera fits {record:?}"));
         let asked_um = f64::from(record.asked.0) * 1e-3;

@@ -1,7 +1,7 @@
 use farnear_protocol::{EventKind, Request, Response};
 
 use super::{Broken, Case};
-use farnear_sim::observer::Seen;
+use farnear_sim::{observer::Seen, wiring::Burst};
 
 /// Microsteps against a hard stop until a stall: 38 (6 um following error), 26 (segment), one rotor period.
 const PRESSED_MAX: u64 = 150;
@@ -81,11 +81,7 @@ pub fn step_after_alarm(case: &Case<'_>) -> Vec<Broken> {
             _ => {}
         }
     }
-    let bursts = case.sights.iter().filter_map(|sight| match &sight.seen {
-        Seen::Stepped(burst) => Some(burst),
-        _ => None,
-    });
-    bursts
+    bursts(case)
         .filter_map(|burst| {
             let (since, _, number) = *spans
                 .iter()
@@ -97,6 +93,13 @@ pub fn step_after_alarm(case: &Case<'_>) -> Vec<Broken> {
             Some(Broken { property: "step-after-alarm", at_ns: burst.last_ns, what })
         })
         .collect()
+}
+
+fn bursts<'a>(case: &Case<'a>) -> impl Iterator<Item = &'a Burst> {
+    case.sights.iter().filter_map(|sight| match &sight.seen {
+        Seen::Stepped(burst) => Some(burst),
+        _ => None,
+    })
 }
 
 fn end(spans: &mut [(u64, u64, u32)], number: u32, at_ns: u64) {
@@ -135,11 +138,7 @@ pub fn moves_unasked(case: &Case<'_>) -> Vec<Broken> {
             _ => {}
         }
     }
-    let bursts = case.sights.iter().filter_map(|sight| match &sight.seen {
-        Seen::Stepped(burst) => Some(burst),
-        _ => None,
-    });
-    bursts
+    bursts(case)
         .filter(|burst| {
             !works.iter().any(|work| work.since_ns <= burst.first_ns && burst.last_ns <= work.until_ns)
         })
