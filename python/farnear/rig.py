@@ -240,18 +240,24 @@ class Rig:
         `z_plan`, `exposure` (ms, default 5) and `time_plan` are supported: an event waits for its `min_start_time` (s since the start,
         or since the last event with `reset_event_timer`). `channels` has the light of each channel: the brightness of the board's two
         outputs, percent, as in `channels={"blue": (100, 0)}`. Events of one exposure, light and start time run as one program on the
-        board. Other channels, stage positions, autofocus, custom actions, properties and SLM images raise `FarnearError` before any motion, as do
-        positions and exposures outside the limits.
+        board. Other channels, stage positions, autofocus, custom actions, properties, regions and SLM images raise `FarnearError` before any
+        motion, as do a relative `z_plan` without a `z` in `stage_positions`, and positions and exposures outside the limits.
 
         Yields
         ------
         Exposure
             Image (height, width) and record of each event.
         """
+        _check_start(sequence)
         events = list(sequence)
         info = self.info()
+        groups: dict[str, str] = {}
         for event in events:
             _check(event, axis, info, channels or {})
+            channel = event.channel
+            if channel is not None and groups.setdefault(channel.config, channel.group) != channel.group:
+                both = f"{groups[channel.config]!r} and {channel.group!r}"
+                raise FarnearError(f"the channel {channel.config!r} is in the groups {both}; expected names that differ")
         return self._run_events(events, axis, wait_s, channels or {})
 
     def _run_events(
@@ -293,7 +299,33 @@ def _program(event: Any) -> tuple[Any, Any, Any]:
     return event.exposure, event.channel, event.min_start_time
 
 
+def _check_start(sequence: Any, start: Optional[float] = None) -> None:
+    """Refuse a relative plan without the position that it is relative to: `useq` takes 0."""
+    plan = getattr(sequence, "z_plan", None)
+    positions = tuple(getattr(sequence, "stage_positions", ()))
+    starts = [start if position.z is None else position.z for position in positions]
+    # A position's own plan replaces that of the sequence.
+    own = [getattr(position.sequence, "z_plan", None) is not None for position in positions]
+    to_start = [at for at, is_own in zip(starts, own) if not is_own] if positions else [start]
+    if plan is not None and plan.is_relative and None in to_start:
+        raise FarnearError(f"z_plan: {plan!r} is relative to no position; give one, as in stage_positions=[{{'z': 50}}]")
+    for position, at in zip(positions, starts):
+        _check_start(position.sequence, at)
+
+
+SUPPORTED = {
+    "index", "channel", "exposure", "min_start_time", "pos_name", "z_pos", "sequence", "metadata", "action", "reset_event_timer",
+}  # fmt: skip
+"""Fields of a `useq` event that are done, or that need nothing to be done."""
+
+
+def _is_asked(value: Any) -> bool:
+    return value is not None and value is not False and not (isinstance(value, (list, tuple)) and not value)
+
+
 def _check(event: Any, axis: str, info: Mapping[str, Any], channels: Mapping[str, tuple[float, float]]) -> None:
+    if not hasattr(event, "min_start_time"):
+        raise TypeError(f"{event!r} is not an event; expected a useq.MDASequence or a list of useq.MDAEvent")
     name = _name(event)
     action = getattr(event.action, "type", "acquire_image") if event.action is not None else "acquire_image"
     if action != "acquire_image":
@@ -301,9 +333,7 @@ def _check(event: Any, axis: str, info: Mapping[str, Any], channels: Mapping[str
     if event.channel is not None and event.channel.config not in channels:
         light = f"channels={{{event.channel.config!r}: (100, 0)}}"
         raise FarnearError(f"{name} asks for the channel {event.channel.config!r}; give its light in percent, as in {light}")
-    asked = {"x_pos": event.x_pos, "y_pos": event.y_pos, "slm_image": event.slm_image}
-    others = [what for what, value in asked.items() if value is not None]
-    others += [what for what in ("properties", "keep_shutter_open") if getattr(event, what)]
+    others = [what for what in type(event).model_fields if what not in SUPPORTED and _is_asked(getattr(event, what))]
     if others:
         raise FarnearError(f"{name} asks for {', '.join(others)}; the rig has z, channels and time only")
     if event.z_pos is None:

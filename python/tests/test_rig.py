@@ -106,6 +106,7 @@ def test_refuses_events_that_the_rig_cannot_do(emulated_rig):
         (useq.MDAEvent(z_pos=50, channel="DAPI"), "channel"),
         (useq.MDAEvent(z_pos=50, x_pos=1), "x_pos"),
         (useq.MDAEvent(z_pos=50, properties=[("device", "name", "1")]), "properties"),
+        (useq.MDAEvent(z_pos=50, keep_shutter_open=True), "keep_shutter_open"),
         (useq.MDAEvent(z_pos=50, action=useq.HardwareAutofocus(autofocus_motor_offset=1)), "autofocus"),
         (useq.MDAEvent(z_pos=50, action=useq.CustomAction(name="shake")), "custom"),
         (useq.MDAEvent(z_pos=50, exposure=1e6), "exposure"),
@@ -114,6 +115,40 @@ def test_refuses_events_that_the_rig_cannot_do(emulated_rig):
     ]:
         with pytest.raises(farnear.FarnearError, match=what):
             emulated_rig.run_sequence([useq.MDAEvent(z_pos=50), event])
+
+
+def test_refuses_a_field_that_it_does_not_know(emulated_rig):
+    useq = pytest.importorskip("useq")
+
+    class Event(useq.MDAEvent):
+        region: tuple = ()
+
+    emulated_rig.home()
+    assert len(list(emulated_rig.run_sequence([Event(z_pos=50)]))) == 1
+    with pytest.raises(farnear.FarnearError, match="asks for region"):
+        emulated_rig.run_sequence([Event(z_pos=50, region=(0, 0, 10, 10))])
+
+
+def test_refuses_what_is_not_an_event_and_channels_of_one_name(emulated_rig):
+    useq = pytest.importorskip("useq")
+    for other in [[{"z_pos": 50}], useq.MDAEvent(z_pos=50)]:
+        with pytest.raises(TypeError, match="expected a useq.MDASequence"):
+            emulated_rig.run_sequence(other)
+    events = [useq.MDAEvent(z_pos=50, channel={"config": "lit", "group": group}) for group in ("Camera", "Lamp")]
+    with pytest.raises(farnear.FarnearError, match="'Camera' and 'Lamp'"):
+        emulated_rig.run_sequence(events, channels={"lit": (50, 0)})
+
+
+def test_a_relative_plan_needs_a_position(emulated_rig):
+    useq = pytest.importorskip("useq")
+    emulated_rig.home()
+    plan = {"relative": [-10, 0, 10]}
+    with_own = [{"z": 50}, {"sequence": {"z_plan": plan}}]
+    for positions in [[], [{"z": 50}, {"name": "b"}], with_own]:
+        with pytest.raises(farnear.FarnearError, match="relative to no position"):
+            emulated_rig.run_sequence(useq.MDASequence(z_plan=plan, stage_positions=positions))
+    taken = list(emulated_rig.run_sequence(useq.MDASequence(z_plan=plan, stage_positions=[{"z": 50}])))
+    assert [exposure.record["asked_um"] for exposure in taken] == [40, 50, 60]
 
 
 def test_events_are_named_by_their_indices(emulated_rig):

@@ -99,17 +99,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         page = page + "\n" + &section;
     }
     if arguments.write {
-        write_page(&(page_of(&page) + "\n" + &arm::kept()?))?;
+        write(&page_file(), &(page_of(&page) + "\n" + &arm::kept()?))?;
     }
     Ok(())
 }
 
 fn page_file() -> PathBuf {
     ROOT.join("docs/speed.md")
-}
-
-fn write_page(text: &str) -> Result<()> {
-    write(&page_file(), text)
 }
 
 fn write(file: &Path, text: &str) -> Result<()> {

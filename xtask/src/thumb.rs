@@ -2,7 +2,6 @@
 //! Debian's Rust with the sources of `core` (for networks that reach a Debian mirror but not Rust's servers).
 
 use std::{
-    fmt,
     path::{Path, PathBuf},
     process::{Command, Stdio},
     time::Duration,
@@ -12,7 +11,7 @@ use anyhow::{Result, bail};
 
 use crate::{
     limited,
-    run::{finish, has, has_target, output, step, succeeds},
+    run::{finish, has, has_target, output, step},
 };
 
 pub const TARGET: &str = "thumbv7em-none-eabihf";
@@ -30,28 +29,15 @@ pub enum Way {
     Debian,
 }
 
-impl fmt::Display for Way {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Installed => "the Rust toolchain on the PATH, which has the target",
-            Self::Debian => "Debian's rustc-web, cargo-web and rust-web-src, building core from source",
-        })
-    }
-}
-
 impl Way {
     /// Installs missing parts if possible.
     pub fn find() -> Result<Self> {
-        let way = Self::find_quietly()?;
-        eprintln!("{TARGET}: {way}");
-        Ok(way)
-    }
-
-    fn find_quietly() -> Result<Self> {
         if has_target(TARGET) || rustup_adds_target() {
+            eprintln!("{TARGET}: the Rust toolchain on the PATH, which has the target");
             return Ok(Self::Installed);
         }
         if debian_ready() || (apt_installs() && debian_ready()) {
+            eprintln!("{TARGET}: Debian's rustc-web, cargo-web and rust-web-src, building core from source");
             return Ok(Self::Debian);
         }
         bail!(
@@ -154,10 +140,7 @@ fn linker() -> Option<PathBuf> {
     if bundled.exists() {
         return Some(bundled);
     }
-    ["rust-lld", "ld.lld"]
-        .map(PathBuf::from)
-        .into_iter()
-        .find(|lld| succeeds(Command::new(lld).arg("--version")))
+    ["rust-lld", "ld.lld"].into_iter().find(|lld| has(lld)).map(PathBuf::from)
 }
 
 fn path_with_debian_first() -> std::ffi::OsString {

@@ -23,8 +23,8 @@ fn features(arguments: &[&str]) -> BTreeMap<String, Vec<String>> {
     found
 }
 
-/// Packages of the demo that another selection compiles with other features.
-fn twice(other: &BTreeMap<String, Vec<String>>) -> Vec<String> {
+/// No package of the demo is compiled with other features for another selection.
+fn shares_with_the_demo(other: &BTreeMap<String, Vec<String>>) {
     let demo = features(&[&DEMO[..], &["--edges", "normal,build"]].concat());
     assert!(demo.len() > 100, "cargo tree found {} packages only", demo.len());
     let differs = |(package, builds): &(&String, &Vec<String>)| {
@@ -33,29 +33,24 @@ fn twice(other: &BTreeMap<String, Vec<String>>) -> Vec<String> {
     let said = |(package, builds): (&String, &Vec<String>)| {
         format!("{package}: the demo with {builds:?}, the others with {:?}", other.get(package))
     };
-    demo.iter().filter(differs).map(said).collect()
+    let twice: Vec<String> = demo.iter().filter(differs).map(said).collect();
+    assert!(
+        twice.is_empty(),
+        "compiled twice; turn the feature on in host/farnear/Cargo.toml too:\n{}",
+        twice.join("\n")
+    );
 }
 
 const DEMO: [&str; 6] = ["--package", "farnear", "--package", "farnear-sim", "--package", "farnear-campaign"];
 
 #[test]
 fn the_demo_and_the_tests_compile_the_same_packages() {
-    let tests = features(&["--workspace", "--exclude", "farnear-python", "--edges", "normal,build,dev"]);
-    let twice = twice(&tests);
-    assert!(
-        twice.is_empty(),
-        "compiled for the demo and again for the tests; turn the feature on in host/farnear/Cargo.toml too:\n{}",
-        twice.join("\n")
-    );
+    let tests = ["--workspace", "--exclude", "farnear-python", "--edges", "normal,build,dev"];
+    shares_with_the_demo(&features(&tests));
 }
 
 #[test]
 fn the_python_module_shares_what_the_programs_compile() {
-    let module = features(&[&DEMO[..], &["--package", "farnear-python", "--edges", "normal,build"]].concat());
-    let twice = twice(&module);
-    assert!(
-        twice.is_empty(),
-        "compiled for the demo and again for Python; turn the feature on in host/farnear/Cargo.toml too:\n{}",
-        twice.join("\n")
-    );
+    let module = [&DEMO[..], &["--package", "farnear-python", "--edges", "normal,build"]].concat();
+    shares_with_the_demo(&features(&module));
 }

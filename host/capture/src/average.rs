@@ -85,4 +85,19 @@ mod tests {
         let one = image(array![[7, 255]]);
         assert_eq!(Average::of(one.clone()).finish(), one);
     }
+
+    #[test]
+    fn three_images_need_two_more_bits_and_16_bits_are_the_most() {
+        let of = |bits, codes: [u16; 3]| {
+            let mut images = codes.map(|code| Image::new(array![[code]], bits)).into_iter();
+            let mut average = Average::of(images.next().expect("three"));
+            images.for_each(|image| average.add(&image));
+            let mean = average.finish();
+            (mean.bits, mean.pixels[[0, 0]])
+        };
+        // 32 / 3 of 255 are 42.8 of 1023.
+        assert_eq!(of(8, [10, 11, 11]), (10, 43));
+        assert_eq!(of(15, [10_000, 10_000, 10_001]), (16, 20_001));
+        assert_eq!(of(16, [10_000, 10_000, 10_002]), (16, 10_001));
+    }
 }

@@ -25,7 +25,7 @@ pub(crate) fn coarseness(pair: &Prepared) -> Array2<f32> {
         box_mean(squares.view(), LEARNED_PX[2])
     };
     // Two differences of sums of two images.
-    let noise = 8.0 * pair.balanced_noise().mean_variance as f32;
+    let noise = 8.0 * pair.noise.mean_variance as f32;
     Zip::from(&energy(1)).and(&energy(APART_PX)).map_collect(|near, apart| {
         let [near_texture, apart_texture] = [near - noise, apart - noise];
         let told = near_texture > TELLING * near && apart_texture > 0.0;

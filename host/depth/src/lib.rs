@@ -12,6 +12,7 @@ pub mod corrections;
 mod cubic;
 pub mod depth_map;
 mod depth_of_alpha;
+mod direction;
 pub mod fill;
 pub mod filter;
 pub mod focus_measure;

@@ -13,6 +13,7 @@ use crate::adaptive_window::{
 use crate::baselines::{self, BaselineError};
 use crate::coarseness::coarseness;
 use crate::depth_map::{DepthMap, Warning};
+use crate::direction::anisotropy;
 use crate::fill;
 use crate::median::median;
 use crate::mosaic::is_mosaic;
@@ -264,7 +265,7 @@ pub(crate) fn measure(
     let mut of_windows = WindowSettings {
         window: settings.window,
         median_px: settings.run.median_px,
-        noise: prepared.balanced_noise(),
+        noise: prepared.noise,
         backend: settings.run.backend,
     };
     // Part of the pair's noise that the estimate is given.
@@ -369,15 +370,21 @@ fn respond(
 ) -> Option<Warning> {
     let is_used = stage.coarser.is_some() || stage.coarseness.is_some();
     let coarseness = is_used.then(|| coarseness(pair));
+    let direction = stage.astigmatism.is_some().then(|| anisotropy(pair));
     Zip::indexed(depth_mm).and(deviation_mm).par_for_each(|at, depth, deviation| {
         let measured = optics.alpha(f64::from(*depth));
         let coarseness = coarseness.as_ref().map_or(f64::NAN, |map| f64::from(map[at]));
         match stage.respond(measured, coarseness) {
             Some([alpha, slope, of_texture]) => {
+                let anisotropy = direction
+                    .as_ref()
+                    .map_or([f64::NAN; 2], |of| of.each_ref().map(|map| f64::from(map[at])));
+                let [shift, of_direction] = stage.shift(measured, anisotropy);
+                let alpha = (alpha - shift).clamp(-OUT_OF_RANGE_ALPHA, OUT_OF_RANGE_ALPHA);
                 *depth = optics.depth_mm(alpha) as f32;
                 let [before, now] = [measured, alpha].map(|alpha| optics.depth_per_alpha_mm(alpha).abs());
                 let of_alpha = f64::from(*deviation) / before * slope;
-                *deviation = (of_alpha.hypot(of_texture) * now) as f32;
+                *deviation = (of_alpha.hypot(of_texture).hypot(of_direction) * now) as f32;
             }
             None if measured.is_finite() => {
                 *depth = optics.depth_mm(OUT_OF_RANGE_ALPHA.copysign(measured)) as f32;

@@ -21,7 +21,7 @@ pub use distortion::{Distortion, DistortionSection};
 pub use doubt::Doubt;
 pub use error::OpticsError;
 pub use file::{FocusSection, LensSection, LightSection, OpticsFile, SensorSection};
-pub use stage::{Coarser, RESPONSE_POINTS, Stage, unexplained};
+pub use stage::{Astigmatism, Coarser, RESPONSE_POINTS, Stage, unexplained};
 
 /// A column or row, whose pixel's centre is an integer, in images with `bin` x `bin` pixels averaged into one; with `1 / bin` the way back.
 pub fn binned_place(place: f64, bin: f64) -> f64 {

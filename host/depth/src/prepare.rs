@@ -36,7 +36,7 @@ use crate::optics::{Distortion, Optics, OpticsError};
 use crate::reason::Reason;
 use balance::Gain;
 use bands::Bands;
-use noise::PairNoise;
+use noise::{Blocks, PairNoise};
 use registration::{LEAST_DISPLACEMENT_PX, model};
 use thinned::Thinned;
 use warp::Warp;
@@ -133,7 +133,7 @@ pub struct PrepareSettings {
     pub limits: Option<[f32; 2]>,
     /// Keep what moved between the exposures and pairs of different scenes.
     pub trust: bool,
-    /// The camera's noise, if known; otherwise it is measured in the pair.
+    /// The noise of the pair once its brightness is balanced, if known; otherwise it is measured.
     pub noise: Option<PairNoise>,
     /// Variance of a pixel by lossy compression, in the images' units; 0 without.
     pub coding: f64,
@@ -219,13 +219,6 @@ pub struct Report {
     pub looks_not_telecentric: bool,
 }
 
-impl Report {
-    /// Factor of balancing on the noise's variance: a near image darker than the far one was amplified.
-    fn noise_gain(&self) -> f64 {
-        self.balanced.map_or(1.0, |balanced| balanced.gain.min(1.0).powi(-2))
-    }
-}
-
 fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
@@ -239,17 +232,10 @@ pub struct Prepared {
     pub near: Array2<f32>,
     /// Code of the [`Reason`] for each pixel that says nothing or was corrected, 0 for the others.
     pub reasons: Array2<u8>,
-    /// The noise of the images as they came.
+    /// The noise of the images as they are here, except for interpolation.
     pub noise: PairNoise,
     /// Report of the preparation.
     pub report: Report,
-}
-
-impl Prepared {
-    /// The noise of the images as they are here, after balancing.
-    pub(crate) fn balanced_noise(&self) -> PairNoise {
-        self.noise.scaled(self.report.noise_gain())
-    }
 }
 
 /// Makes the images `[far, near]`, (height, width), of any common scale, ready for depth. Nothing is copied that need not be,
@@ -291,11 +277,14 @@ pub(crate) fn prepare_after(
             defects::mend(image, marks);
         }
     }
-    let Some(distortion) = optics.distortion() else {
-        return finish(last, [far, near], None, marks, optics, settings);
-    };
     // Interpolation takes noise away, so it is measured before.
-    let noise = settings.noise.or_else(|| noise::of_pair(far.view(), near.view()));
+    let blocks = match settings.noise {
+        Some(_) => Blocks::default(),
+        None => Blocks::of(far.view(), near.view()),
+    };
+    let Some(distortion) = optics.distortion() else {
+        return finish(last, [far, near], None, marks, &blocks, optics, settings);
+    };
     let recorded = Recorded { near: near.clone(), distortion };
     let marks = marks.map(|marks| Some(straight::reasons(marks.as_ref(), size, &distortion)));
     let shows = |image: &Array2<f32>| image.iter().any(|value| value.is_finite());
@@ -305,7 +294,7 @@ pub(crate) fn prepare_after(
         let ([cx, cy], (height, width)) = (distortion.centre_px(), size);
         return Err(OpticsError::NothingStraight { cx, cy, width, height }.into());
     }
-    finish(last, pair, Some(recorded), marks, optics, &PrepareSettings { noise, ..*settings })
+    finish(last, pair, Some(recorded), marks, &blocks, optics, settings)
 }
 
 /// The near image as the lens recorded it: aligning it interpolates it once, not twice.
@@ -330,18 +319,12 @@ fn finish(
     [far, near]: [Array2<f32>; 2],
     recorded: Option<Recorded>,
     marks: [Option<Array2<u8>>; 2],
+    blocks: &Blocks,
     optics: &Optics,
     settings: &PrepareSettings,
 ) -> Result<Prepared, PrepareError> {
     let is_first = last.is_none();
     let size = far.dim();
-    let measured = settings.noise.or_else(|| noise::of_pair(far.view(), near.view()));
-    let noise = measured.unwrap_or_default();
-    let noise = if settings.coding > 0.0 {
-        noise.coded(settings.coding, brightness::mean(far.view()))
-    } else {
-        noise
-    };
     let mut report = Report::default();
     let moved = |warp: Warp| match &recorded {
         Some(Recorded { near, distortion }) => {
@@ -375,7 +358,14 @@ fn finish(
     if marked {
         report.saturated_fraction = part_of(&reasons, Reason::Saturated);
     }
-    let agreement = agreement::compare(&thinned, size, &noise.scaled(report.noise_gain()));
+    let gain = report.balanced.map_or(1.0, |balanced| balanced.gain);
+    let noise = settings.noise.or_else(|| blocks.noise(gain)).unwrap_or_default();
+    let noise = if settings.coding > 0.0 {
+        noise.coded(settings.coding, brightness::mean(far.view()))
+    } else {
+        noise
+    };
+    let agreement = agreement::compare(&thinned, size, &noise);
     drop(thinned);
     report.equally_sharp = agreement.equally_sharp;
     (report.correlation, report.detailed_fraction) = (agreement.correlation, agreement.detailed);

@@ -130,10 +130,7 @@ impl Api {
         let parameter =
             json!({ "name": name, "in": "query", "description": about, "schema": { "type": "string" } });
         if let Some(operation) = self.paths.get_mut(path).and_then(|path| path.get_mut("get")) {
-            match operation.get_mut("parameters").and_then(Value::as_array_mut) {
-                Some(parameters) => parameters.push(parameter),
-                None => operation["parameters"] = json!([parameter]),
-            }
+            add_parameter(operation, parameter);
         }
         self
     }
@@ -149,10 +146,7 @@ impl Api {
         for name in in_path {
             let parameter =
                 json!({ "name": name, "in": "path", "required": true, "schema": { "type": "string" } });
-            match operation.get_mut("parameters").and_then(Value::as_array_mut) {
-                Some(parameters) => parameters.push(parameter),
-                None => operation["parameters"] = json!([parameter]),
-            }
+            add_parameter(&mut operation, parameter);
         }
         let entry = self.paths.entry(path).or_insert_with(|| json!({}));
         entry[method] = operation;
@@ -176,6 +170,13 @@ impl Api {
             "components": { "schemas": schemas },
         });
         (self.router, document, self.access)
+    }
+}
+
+fn add_parameter(operation: &mut Value, parameter: Value) {
+    match operation.get_mut("parameters").and_then(Value::as_array_mut) {
+        Some(parameters) => parameters.push(parameter),
+        None => operation["parameters"] = json!([parameter]),
     }
 }
 

@@ -73,16 +73,6 @@ pub struct Begun {
     work: Work,
 }
 
-pub struct Workers(Vec<JoinHandle<()>>);
-
-impl Workers {
-    pub fn join(self) {
-        for thread in self.0 {
-            let _ = thread.join(); // a job that panicked has said so on stderr
-        }
-    }
-}
-
 impl JobQueue {
     /// Begins a job and returns its number; the error is the title of the running job.
     pub fn begin(&self, task: Task, told: impl FnOnce(Job)) -> Result<u64, String> {
@@ -144,14 +134,13 @@ impl JobQueue {
     }
 }
 
-pub fn start(app: &Arc<App>) -> io::Result<Workers> {
+pub fn start(app: &Arc<App>) -> io::Result<[JoinHandle<()>; 2]> {
     let (on_rig, computing) = (app.rig_jobs.open(), app.computing.open());
     let (rig, computer) = (Arc::clone(app), Arc::clone(app));
-    let threads = [
+    Ok([
         Builder::new().name("rig jobs".into()).spawn(move || run_rig(&rig, &on_rig, live::look))?,
         Builder::new().name("computing".into()).spawn(move || run_computing(&computer, &computing))?,
-    ];
-    Ok(Workers(threads.into()))
+    ])
 }
 
 /// Runs jobs on the rig, and live views (`look`) between them.

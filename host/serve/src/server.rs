@@ -98,7 +98,7 @@ pub fn serve(
         served?;
         return Ok(stopped?);
     }
-    workers.join();
+    workers.into_iter().for_each(|thread| drop(thread.join())); // a job that panicked has said so on stderr
     runtime.shutdown_timeout(FAREWELL);
     Ok(served?)
 }

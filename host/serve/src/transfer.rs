@@ -180,7 +180,7 @@ pub async fn receive(body: Body, mut upload: Upload, pause_max: Duration) -> Res
     if part.as_file().metadata().is_ok_and(|file| file.len() == 0) {
         let name = target.file_name().unwrap_or_default().to_string_lossy();
         let error = format!("the upload {name} has 0 bytes; expected a video");
-        return Err(Failure::new(StatusCode::BAD_REQUEST, error).with_hint("Choose a file with contents."));
+        return Err(Failure::bad_request(error).with_hint("Choose a file with contents."));
     }
     let published = upload.finish(|target| part.persist(target).map(drop).map_err(|failed| failed.error));
     published.map_err(|error| disk(&target, &error))
@@ -203,7 +203,7 @@ async fn receive_part(
             Ok(None) => return Ok(()),
             Ok(Some(Ok(piece))) => piece,
             Ok(Some(Err(error))) => {
-                return Err(Failure::new(StatusCode::BAD_REQUEST, format!("the upload broke off: {error}")));
+                return Err(Failure::bad_request(format!("the upload broke off: {error}")));
             }
             Err(_) => {
                 let error = format!("the upload paused for more than {} s", pause_max.as_secs());

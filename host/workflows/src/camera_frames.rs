@@ -27,6 +27,8 @@ const DARKEST: f64 = 0.5;
 /// Largest distance of a dark frame's mean from the darkest one's, relative to the flat frames' mean: dark current may differ by some
 /// per cent, a frame with light by much more.
 const UNLIKE: f64 = 0.05;
+/// Part of the pixels with the largest value from which a flat frame tells nothing: that of noise is rare.
+const CLIPPED: f64 = 0.5;
 /// Part of full scale below which light is weak: a step of 8 bits is then more than 4 % of it.
 const WEAK: f64 = 0.1;
 
@@ -94,6 +96,7 @@ pub fn calibrate(settings: &CalibrateCameraRequest, context: &Context<'_>) -> Re
         "one exposure and the lens covered; a flat frame belongs to --flat",
     )?;
     let frames = CameraFrames::learn(&dark.images, &flat.images)?;
+    flat.check_values()?;
     doubts(&flat, &dark).iter().for_each(|doubt| context.progress.warn(doubt));
     let staged = Staging::into_folder(&settings.out)?;
     staged.write(DARK, &npy::write(frames.dark()))?;
@@ -181,6 +184,23 @@ impl<'a> Exposures<'a> {
             if let Some(same) = same.filter(|_| image.iter().any(|other| Some(other) != value)) {
                 let same = self.files[same].display();
                 let expected = format!("it is the same image as {same}, and adds nothing: leave it out");
+                return self.refused(index, expected);
+            }
+        }
+        Ok(())
+    }
+
+    /// Fails for a frame that is clipped at any level, or without noise.
+    fn check_values(&self) -> Result<()> {
+        for (index, image) in self.images.iter().enumerate() {
+            let largest = image.iter().copied().fold(0.0, f32::max);
+            let clipped = image.iter().filter(|value| **value == largest).count() as f64 / image.len() as f64;
+            if clipped > CLIPPED {
+                let expected = format!(
+                    "{:.0} % of its pixels have its largest value, {largest:.3} of full scale: it is saturated, or rounding hides the \
+                     response of the pixels; expose to about half of full scale and save all bits of the camera",
+                    100.0 * clipped
+                );
                 return self.refused(index, expected);
             }
         }
@@ -327,6 +347,17 @@ mod tests {
             let [black, again] = ["d.png", "e.png"].map(|name| bench.exposure(name, SIZE, [level, 0.0]));
             assert_eq!(bench.calibrate(&[&flat], &[&black, &again]).unwrap(), [""; 0]);
         }
+    }
+
+    #[test]
+    fn a_flat_frame_without_noise_is_refused() {
+        let bench = Bench(tempfile::tempdir().unwrap());
+        let [good, dark] = [bench.flat("a.png"), bench.dark("d.png")];
+        let clipped = bench.exposure("clipped.png", SIZE, [0.97, 0.0]);
+        let phrase = "clipped.png: 100 % of its pixels have its largest value, 0.970";
+        bench.refused(&[&clipped], &[&dark], ["flat", phrase, "half of full scale"]);
+        let even = bench.exposure("even.png", SIZE, [0.4, 0.0]);
+        bench.refused(&[&good, &even], &[&dark], ["flat", "even.png: 100 %", "all bits"]);
     }
 
     #[test]

@@ -186,16 +186,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cancelling_reaches_every_clone() {
-        let context = Context::unattended();
-        let copy = context.cancel.clone();
-        assert!(context.cancel.check("waiting").is_ok());
-        copy.cancel();
-        let error = context.cancel.check("waiting").unwrap_err();
-        assert!(matches!(error, WorkflowError::Cancelled { during } if during == "waiting"));
-    }
-
-    #[test]
     fn unattended_prompts_fail() {
         let context = Context::unattended();
         let error = context.questions.ask("ready?", &context.cancel).unwrap_err();

@@ -32,7 +32,7 @@ pub struct Note {
     pub text: String,
 }
 
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Debug, Default, Serialize)]
 pub struct Capture {
     pub name: String,
     /// `pair` or `sequence`.
@@ -117,27 +117,20 @@ pub fn existing(session: &Path, name: &str) -> Result<PathBuf> {
 
 fn check_regular(folder: &Path) -> Result<()> {
     let failed = WorkflowError::read("the capture", folder);
-    let missing = || WorkflowError::read("the capture", folder)(std::io::ErrorKind::NotFound.into());
     let is_dir = fs::symlink_metadata(folder).is_ok_and(|found| found.is_dir());
     let has_record = fs::symlink_metadata(folder.join(CAPTURE_FILE)).is_ok();
     if !is_dir || !has_record {
-        return Err(missing());
+        return Err(failed(std::io::ErrorKind::NotFound.into()));
     }
+    let is_odd = |entry: &fs::DirEntry| entry.file_type().is_ok_and(|kind| !kind.is_file() && !kind.is_dir());
     let entries = fs::read_dir(folder).and_then(Iterator::collect::<std::io::Result<Vec<_>>>);
-    let odd = entries.and_then(|entries| {
-        let odd = entries
-            .into_iter()
-            .find(|entry| entry.file_type().is_ok_and(|kind| !kind.is_file() && !kind.is_dir()));
-        match odd {
-            None => Ok(()),
-            Some(entry) => {
-                let name = entry.file_name();
-                let text = format!("{} is a link, FIFO or device; expected a regular file", name.display());
-                Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, text))
-            }
-        }
+    let checked = entries.and_then(|entries| {
+        let Some(entry) = entries.into_iter().find(is_odd) else { return Ok(()) };
+        let name = entry.file_name();
+        let text = format!("{} is a link, FIFO or device; expected a regular file", name.display());
+        Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, text))
     });
-    odd.map_err(failed)
+    checked.map_err(failed)
 }
 
 /// Variant with the result of a focus stack.
@@ -257,24 +250,7 @@ pub fn rename(session: &Path, name: &str, to: &str) -> Result<()> {
 }
 
 fn broken(name: &str, error: &WorkflowError) -> Capture {
-    Capture {
-        name: name.into(),
-        kind: "sequence",
-        images: Vec::new(),
-        files: Vec::new(),
-        variants: Vec::new(),
-        written_unix_s: 0,
-        time: None,
-        width: 0,
-        height: 0,
-        bits: 0,
-        exposure_us: 0,
-        scene: None,
-        optics: toml::Table::new(),
-        has_depth: false,
-        note: Note::default(),
-        broken: Some(error.to_string()),
-    }
+    Capture { name: name.into(), kind: "sequence", broken: Some(error.to_string()), ..Capture::default() }
 }
 
 /// Whether name, record and note contain all words, ignoring case.

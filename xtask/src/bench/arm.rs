@@ -29,7 +29,7 @@ pub fn renew(write: bool) -> Result<()> {
     if write {
         let page = page()?;
         let before = page.find(HEADING).map_or(&page[..], |start| &page[..start]);
-        super::write_page(&format!("{}\n\n{section}", before.trim_end()))?;
+        super::write(&super::page_file(), &format!("{}\n\n{section}", before.trim_end()))?;
     }
     Ok(())
 }

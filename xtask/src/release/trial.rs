@@ -52,12 +52,16 @@ pub fn programs(release: &Release, target: &Target, left_out: &mut Vec<String>) 
         depth(&|| Command::new(folder.join("farnear")), &ROOT.join(OPTICS), &root.join("pair"))?;
         return captures(&folder, &root.join("capture"));
     };
-    let emulated = || {
-        let mut command = Command::new(&runner);
-        command.arg(folder.join("farnear"));
-        command
-    };
-    depth(&emulated, &ROOT.join(OPTICS), &root.join("pair"))
+    depth(&|| farnear(Some(&runner), &folder), &ROOT.join(OPTICS), &root.join("pair"))
+}
+
+/// `farnear` of a folder, by the emulator of its processor if it needs one.
+fn farnear(runner: Option<&String>, folder: &Path) -> Command {
+    let program = folder.join("farnear");
+    let Some(runner) = runner else { return Command::new(program) };
+    let mut command = Command::new(runner);
+    command.arg(program);
+    command
 }
 
 /// Installs a Debian package into an empty root and runs its programs.
@@ -91,15 +95,7 @@ pub fn package(release: &Release, target: &Target, package: &Path, left_out: &mu
             return Ok(());
         }
     };
-    let farnear = || match &runner {
-        Some(runner) => {
-            let mut command = Command::new(runner);
-            command.arg(programs.join("farnear"));
-            command
-        }
-        None => Command::new(programs.join("farnear")),
-    };
-    depth(&farnear, &ROOT.join(OPTICS), &root.join("pair"))?;
+    depth(&|| farnear(runner.as_ref(), &programs), &ROOT.join(OPTICS), &root.join("pair"))?;
     if target.runs_here() { captures(&programs, &root.join("capture")) } else { Ok(()) }
 }
 

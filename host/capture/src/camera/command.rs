@@ -85,7 +85,7 @@ impl Raw {
         let padded = row.div_ceil(PADDING) * PADDING;
         let format = RAW_FORMAT;
         match padded == row {
-            true => format!("are the size and the format right ({format})?"),
+            true => format!("are size, stride and format right ({format})?"),
             false => format!(
                 "a row of {width} px has {row} bytes; programs often pad rows to a multiple of {PADDING} bytes: \
                  if so, name the stride, {width}x{height}/{padded} ({format})"

@@ -3,6 +3,7 @@
 use std::{
     collections::BTreeMap,
     fs,
+    hash::{DefaultHasher, Hasher},
     path::{Path, PathBuf},
     time::{Duration, Instant, SystemTime},
 };
@@ -32,6 +33,8 @@ const QUIET: Duration = Duration::from_secs(2);
 pub struct FolderCamera {
     folder: PathBuf,
     used: BTreeMap<PathBuf, Used>,
+    /// Other files and folders at arming.
+    others: Vec<PathBuf>,
     /// The next file, possibly incomplete: contents and the time of the last change.
     candidate: Option<(PathBuf, Vec<u8>, Instant)>,
     pairing: Pairing,
@@ -41,8 +44,8 @@ pub struct FolderCamera {
 struct Used {
     written: SystemTime,
     bytes: u64,
-    /// Paired since arming, rather than present before.
-    paired: bool,
+    /// Hash of the file if it was paired since arming, rather than present before.
+    paired: Option<u64>,
 }
 
 impl FolderCamera {
@@ -50,6 +53,7 @@ impl FolderCamera {
         let mut camera = Self {
             folder: folder.into(),
             used: BTreeMap::new(),
+            others: Vec::new(),
             candidate: None,
             pairing: Pairing::default(),
         };
@@ -61,21 +65,25 @@ impl FolderCamera {
         self.used.clear();
         self.candidate = None;
         for (written, path, bytes) in self.pictures()? {
-            self.used.insert(path, Used { written, bytes, paired: false });
+            self.used.insert(path, Used { written, bytes, paired: None });
         }
+        self.others = self.files()?.into_iter().filter(|path| !is_picture(path)).collect();
         Ok(())
     }
 
-    fn pictures(&self) -> Result<Vec<(SystemTime, PathBuf, u64)>, CameraError> {
+    fn files(&self) -> Result<Vec<PathBuf>, CameraError> {
         let failed = |source| CameraError::Folder { folder: self.folder.clone(), source };
-        let mut pictures = Vec::new();
+        let mut files = Vec::new();
         for entry in fs::read_dir(&self.folder).map_err(failed)? {
-            let path = entry.map_err(failed)?.path();
-            let ending =
-                path.extension().and_then(|ending| ending.to_str()).unwrap_or("").to_ascii_lowercase();
-            if pictures::hidden(&path) || !pictures::EXTENSIONS.contains(&ending.as_str()) {
-                continue;
-            }
+            files.push(entry.map_err(failed)?.path());
+        }
+        files.retain(|path| !pictures::hidden(path));
+        Ok(files)
+    }
+
+    fn pictures(&self) -> Result<Vec<(SystemTime, PathBuf, u64)>, CameraError> {
+        let mut pictures = Vec::new();
+        for path in self.files()?.into_iter().filter(|path| is_picture(path)) {
             // A file renamed meanwhile is no longer an image.
             let Ok(data) = fs::metadata(&path) else { continue };
             if let Ok(written) = data.modified() {
@@ -87,20 +95,24 @@ impl FolderCamera {
 
     /// New images, oldest first, then by number or name. Returns [`CameraError::Overwritten`] for a rewritten file,
     /// [`CameraError::File`] for one picture in two formats.
-    fn fresh(&self) -> Result<Vec<(SystemTime, PathBuf)>, CameraError> {
+    fn fresh(&mut self) -> Result<Vec<(SystemTime, PathBuf)>, CameraError> {
         let mut fresh = Vec::new();
         for (written, path, bytes) in self.pictures()? {
-            match self.used.get(&path) {
+            match self.used.get_mut(&path) {
                 None => fresh.push((written, path)),
                 Some(used) if (used.written, used.bytes) == (written, bytes) => {}
-                Some(used) if used.paired || was_complete(used, written) => {
+                // Some programs set the time of a complete file.
+                Some(used) if used.paired.is_some() && used.paired == hash_of(&path) => {
+                    used.written = written;
+                }
+                Some(used) if used.paired.is_some() || was_complete(used, written) => {
                     return Err(CameraError::Overwritten { path });
                 }
                 Some(_) => {} // it was being written when the camera was armed
             }
         }
         for (at, (_, path)) in fresh.iter().enumerate() {
-            let paired = self.used.iter().filter(|(_, used)| used.paired).map(|(path, _)| path);
+            let paired = self.used.iter().filter(|(_, used)| used.paired.is_some()).map(|(path, _)| path);
             let mut others = fresh[..at].iter().map(|(_, other)| other).chain(paired);
             if let Some(twin) = others.find(|other| other.with_extension("") == path.with_extension("")) {
                 let twin = twin.file_name().unwrap_or_default().display();
@@ -128,8 +140,8 @@ impl FolderCamera {
                     Some((same, read, since)) if *same == path && *read == bytes => {
                         match complete(&bytes).and_then(|()| decode_grey(&bytes)) {
                             Ok(picture) => {
-                                let size = bytes.len() as u64;
-                                let used = Used { written, bytes: size, paired: true };
+                                let paired = Some(hash(&bytes));
+                                let used = Used { written, bytes: bytes.len() as u64, paired };
                                 self.used.insert(path.clone(), used);
                                 let failed = |reason| CameraError::File { path: path.clone(), reason };
                                 let image = of_picture(picture).map_err(failed)?;
@@ -157,6 +169,21 @@ impl FolderCamera {
             std::thread::sleep(POLL.min(left));
         }
     }
+}
+
+fn is_picture(path: &Path) -> bool {
+    let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or("").to_ascii_lowercase();
+    pictures::EXTENSIONS.contains(&ending.as_str())
+}
+
+fn hash(bytes: &[u8]) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    hasher.write(bytes);
+    hasher.finish()
+}
+
+fn hash_of(path: &Path) -> Option<u64> {
+    fs::read(path).ok().map(|bytes| hash(&bytes))
 }
 
 /// Whether the file had been complete before it was rewritten.
@@ -196,6 +223,17 @@ impl Camera for FolderCamera {
     fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError> {
         let camera = format!("folder {}", self.folder.display());
         let Some((image, evidence)) = self.next(wait)? else {
+            let is_new = |path: &PathBuf| !is_picture(path) && !self.others.contains(path);
+            let camera = match self.files()?.into_iter().find(is_new) {
+                Some(other) => {
+                    let name = other.file_name().unwrap_or_default().display();
+                    format!(
+                        "{camera}, where {name} came; expected a file of {}",
+                        pictures::EXTENSIONS.join(", ")
+                    )
+                }
+                None => camera,
+            };
             return Err(CameraError::Late { camera, trigger_number: shot.trigger_number, waited: wait });
         };
         match self.pairing.judge(&camera, evidence, shot)? {
@@ -236,7 +274,7 @@ mod tests {
     #[test]
     fn what_macos_writes_next_to_a_picture_is_not_one() {
         let folder = tempfile::tempdir().unwrap();
-        let camera = FolderCamera::watch(folder.path()).unwrap();
+        let mut camera = FolderCamera::watch(folder.path()).unwrap();
         for name in ["._1.jpg", ".part.jpg", "1.jpg"] {
             fs::write(folder.path().join(name), name).unwrap();
         }

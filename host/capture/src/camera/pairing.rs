@@ -30,6 +30,8 @@ const REPORTED_MAX: usize = 256;
 const QUIET: Duration = Duration::from_millis(200);
 /// Two crystals differ by 50 ppm each, plus a margin.
 const DRIFT_PPM: u64 = 200;
+/// Cameras number their files from 1 to one less (DCF).
+const COUNTER: u64 = 10_000;
 /// GigE Vision 1.x counts from 1 to this, skipping 0.
 const SHORT_COUNT_MAX: u64 = 65_535;
 
@@ -90,8 +92,11 @@ pub struct Pairing {
     /// Whether board time follows the local clock; an emulated board may run faster.
     in_real_time: bool,
     contents: Vec<(u64, u32)>,
-    /// Longest interval of two exposures.
+    /// Longest interval of two exposures, or one and a half times the longest wait for a picture without a stamp: a
+    /// surplus one may be as late.
     longest: Duration,
+    /// Arrival of the last picture.
+    came: Option<Instant>,
     delays: Delays,
     /// Of a later exposure, whose image it is.
     early: Option<Frame>,
@@ -114,6 +119,7 @@ impl Pairing {
             in_real_time: false,
             contents: Vec::new(),
             longest: Duration::ZERO,
+            came: None,
             delays: Delays::default(),
             early: None,
         }
@@ -191,7 +197,8 @@ impl Pairing {
         if let Some((last, _)) = &self.last
             && let (Some((before, _)), Some((at, path))) = (&last.taken, &evidence.taken)
         {
-            let by_file = || at.cmp(before).then_with(|| self.by_name(path));
+            // A file's time may be that of its transfer; a counter that goes back contradicts it.
+            let by_file = || at.cmp(before).min(self.by_name(path));
             let exposed = evidence.exposed.as_ref().zip(last.exposed.as_ref());
             if exposed.map_or(Ordering::Equal, |(at, before)| at.cmp(before)).then_with(by_file)
                 == Ordering::Less
@@ -203,6 +210,11 @@ impl Pairing {
         if belongs != Belongs::Here {
             return Ok(belongs);
         }
+        let came = evidence.arrived.unwrap_or_else(Instant::now);
+        let reported = self.delays.reported_at(wanted).filter(|_| evidence.stamp == Stamp::default());
+        // Until the picture before it came, the camera was busy with that one.
+        let begun = reported.max(reported.and(self.came));
+        let waited = begun.map_or(Duration::ZERO, |begun| came.saturating_duration_since(begun));
         let earliest = self.at_least(shot.strobe_start.0).filter(|_| self.in_real_time);
         if let (Some(arrived), Some(earliest)) = (evidence.arrived, earliest)
             && let Some(early) = earliest.checked_duration_since(arrived + ARRIVAL_JITTER)
@@ -224,7 +236,9 @@ impl Pairing {
             // The first of a program: the time since the program before does not count.
             _ => (shot.trigger.0.saturating_sub(u64::from(shot.settle.0)), shot.strobe_end.0),
         };
-        self.longest = self.longest.max(Duration::from_micros(to.saturating_sub(from)));
+        let interval = Duration::from_micros(to.saturating_sub(from));
+        self.longest = self.longest.max(interval).max(waited * 3 / 2);
+        self.came = Some(came);
         self.last = Some((evidence, *shot));
         Ok(Belongs::Here)
     }
@@ -295,6 +309,10 @@ struct Delays {
 }
 
 impl Delays {
+    fn reported_at(&self, trigger_number: u32) -> Option<Instant> {
+        self.reported.iter().find(|(number, _)| *number == trigger_number).map(|(_, at)| *at)
+    }
+
     /// Why a picture before this one is missing. `interval_us` is the time since the exposure before.
     fn one_is_missing(
         &mut self,
@@ -331,7 +349,8 @@ impl Delays {
     }
 }
 
-/// Orders two files by their trailing number; four-digit counters wrap after 9999. `None` if more differs.
+/// Orders two files by their trailing number; cameras' counters of four digits wrap after 9999, also where the name has
+/// digits before them (`DSC09999`, `P1019999`). `None` if more differs.
 pub fn by_number(a: &Path, b: &Path) -> Option<Ordering> {
     let split = |path: &Path| {
         let stem = path.file_stem()?.to_str()?.to_owned();
@@ -343,8 +362,11 @@ pub fn by_number(a: &Path, b: &Path) -> Option<Ordering> {
     if name_a != name_b {
         return None;
     }
-    // Half of the counter exceeds any distance within a program.
-    let rolled_over = digits_a == 4 && digits_b == 4 && a.abs_diff(b) > 5_000;
+    // Half of the counter exceeds any distance within a program. Longer numbers are times.
+    let rolled_over = digits_a == digits_b
+        && (4..=7).contains(&digits_a)
+        && a / COUNTER == b / COUNTER
+        && a.abs_diff(b) > COUNTER / 2;
     Some(if rolled_over { b.cmp(&a) } else { a.cmp(&b) })
 }
 

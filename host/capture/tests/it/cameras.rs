@@ -302,6 +302,30 @@ fn names_a_rewritten_file() {
 }
 
 #[test]
+fn names_a_new_file_that_is_not_a_picture_if_none_comes() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("IMG_0001.CR2"), "raw").unwrap();
+    let mut camera = FolderCamera::watch(folder.path()).unwrap();
+    camera.arm(TriggerMode::Hardware, Micros(1)).unwrap();
+    let mut late = || camera.image(&shot(1), Duration::from_millis(10)).unwrap_err().to_string();
+    assert!(!late().contains("CR2"), "it was there before");
+    fs::write(folder.path().join("IMG_0002.CR2"), "raw").unwrap();
+    let text = late();
+    assert!(text.contains("IMG_0002.CR2 came; expected a file of png, tif"), "{text}");
+}
+
+/// Copies and transfers set the time after the last byte.
+#[test]
+fn accepts_a_changed_time_of_a_used_file() {
+    let (folder, mut camera) = used_folder("a.png");
+    let file = fs::File::options().write(true).open(folder.path().join("a.png")).unwrap();
+    file.set_modified(std::time::SystemTime::now() - Duration::from_secs(3_600)).unwrap();
+    fs::write(folder.path().join("b.png"), picture(200)).unwrap();
+    second_picture(&mut camera).unwrap();
+    camera.finish(Duration::from_millis(10)).unwrap();
+}
+
+#[test]
 fn waits_for_and_rejects_a_truncated_jpeg() {
     let (folder, mut camera) = used_folder("a.png");
     let mut jpeg = Vec::new();

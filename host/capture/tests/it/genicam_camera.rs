@@ -338,7 +338,9 @@ fn a_packet_of_another_program_is_no_frame() {
     // Frame 1, packet 0, of a type that GigE Vision does not have.
     let foreign = [&[0, 0, 0, 1, 0x7f, 0, 0, 0][..], &[0; 56]].concat();
     let sender = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
-    for port in own_ports() {
+    let ports = own_ports();
+    assert!(ports.len() > 1, "only the sender's socket was found: {ports:?}");
+    for port in ports {
         sender.send_to(&foreign, ("127.0.0.1", port)).unwrap();
     }
     camera.trigger(1, EXPOSURE).unwrap();

@@ -10,6 +10,7 @@
 //! A stage that moves the target gives relative distances: the far plane is at [`Moved::Target::far_mm`], and depth falls
 //! by one step per slice. A stage that moves the sensor of a known lens gives distances by the lens equation.
 
+mod astigmatism;
 pub mod blur;
 mod curve;
 mod fixed_pattern;
@@ -25,6 +26,7 @@ use crate::measure::binned;
 use crate::optics::{FocusSection, LensSection, Optics, OpticsFile, SensorSection, Stage};
 use crate::psf::Psf;
 use crate::slice_order;
+use astigmatism::FocusByDirection;
 use blur::BlurCurve;
 use focus_plane::FocusPlane;
 
@@ -165,6 +167,7 @@ pub fn calibrate_stack(
     let evened = brightness::evened(slices);
     let plane = FocusPlane::of(&evened, &not_stopped)?;
     let blur = BlurCurve::of(&evened, &plane, &not_stopped)?;
+    let by_direction = FocusByDirection::of(&evened, &not_stopped)?;
     drop(evened);
     let (bin, pair_step) = separation(&blur, slices.len(), largest_bin(slices[0].dim()), settings)?;
     let limit = FLAT * pair_step as f64;
@@ -186,6 +189,7 @@ pub fn calibrate_stack(
     let response::Learned { optics, held_out, trials, foreign } = response::learn(&response::Target {
         slices: &small,
         plane: &plane_of_bins,
+        by_direction: by_direction.map(|focus| focus.of_pairs(pair_step)),
         pair_step,
         bin,
         coding: settings.coding / (bin * bin) as f64,

@@ -39,6 +39,9 @@ pub struct Stage {
     /// Response to coarser texture.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coarser: Option<Coarser>,
+    /// Shift of depth by the direction of the texture.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub astigmatism: Option<Astigmatism>,
 }
 
 /// No profile fits a real lens at all frequencies, so depth depends on the spectrum of the texture. All values are at the
@@ -54,6 +57,21 @@ pub struct Coarser {
     pub coarseness: [f64; RESPONSE_POINTS],
 }
 
+/// An astigmatic lens has lines of one direction in focus nearer than those across.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Astigmatism {
+    /// Normalised depth that the texture's anisotropy (see `direction.rs`) adds, per unit, in the middle of the field.
+    pub shift: [f64; 2],
+    /// Standard deviation of the shift: over the field, and by its measurement.
+    pub spread: f64,
+    /// Anisotropy of the target, as seen through the lens, at the measured depths of [`Stage::response`].
+    pub of_target: [[f64; RESPONSE_POINTS]; 2],
+}
+
+/// Standard deviation of a shift by astigmatism relative to it: the frequencies that give the direction are not weighted
+/// exactly as those that give depth. Chosen on one lens by wave optics.
+const DIRECTION_ERROR: f64 = 0.3;
 /// Extrapolation between the textures.
 const MIXED: [f64; 2] = [-0.3, 1.3];
 /// Standard deviation of a mixture `p` of two responses, relative to `4 p (1 - p)` of their difference: depth need not change
@@ -87,6 +105,7 @@ impl Stage {
             usual_unexplained: 1.0,
             coarseness: None,
             coarser: None,
+            astigmatism: None,
         }
     }
 
@@ -115,6 +134,21 @@ impl Stage {
         Some([value + part * (other - value), slope + part * (its_slope - slope), mixed])
     }
 
+    /// Normalised depth that astigmatism adds to texture of an anisotropy, relative to the target, and its standard deviation.
+    pub fn shift(&self, measured: f64, anisotropy: [f64; 2]) -> [f64; 2] {
+        let Some(Astigmatism { shift, spread, of_target }) = &self.astigmatism else { return [0.0; 2] };
+        let [cos, sin] = [0, 1].map(|i| {
+            let usual = interpolated(self.measured, &of_target[i], measured);
+            usual.map_or(f64::NAN, |[usual, _]| anisotropy[i] - usual)
+        });
+        let away = cos.hypot(sin);
+        if !away.is_finite() {
+            return [0.0; 2];
+        }
+        let by = shift[0] * cos + shift[1] * sin;
+        [by, (DIRECTION_ERROR * by).hypot(spread * away)]
+    }
+
     pub(super) fn problem(&self) -> Option<&'static str> {
         let finite = self.response.iter().chain(&self.measured).all(|v| v.is_finite() && v.abs() < 2.0);
         if !(1..=Self::LARGEST_BIN).contains(&self.bin) {
@@ -128,6 +162,12 @@ impl Stage {
             let all = response.iter().chain(of_target).chain(coarseness);
             if !(apart && all.clone().all(|v| v.is_finite() && v.abs() < 20.0)) {
                 return Some("coarser must have finite values and a larger coarseness than of_target");
+            }
+        }
+        if let Some(Astigmatism { shift, spread, of_target }) = &self.astigmatism {
+            let all = shift.iter().chain(of_target.as_flattened()).chain([spread]);
+            if !all.clone().all(|v| v.is_finite() && v.abs() < 20.0) || *spread < 0.0 {
+                return Some("astigmatism must have finite values and a spread of 0 or more");
             }
         }
         if self.coarseness.is_some_and(|[fine, coarse]| !(fine.is_finite() && coarse >= fine)) {
@@ -191,6 +231,14 @@ mod tests {
             assert!((value - 0.2 - more).abs() < 1e-9, "{coarseness} {value}");
             assert_eq!(deviation > 0.0, coarseness != 1.0 && coarseness != 2.0 && !coarseness.is_nan());
         }
+        let of_target = [0.2, 0.0].map(|usual| [usual; RESPONSE_POINTS]);
+        let astigmatism = Astigmatism { shift: [0.5, 0.0], spread: 0.1, of_target };
+        let astigmatic = Stage { astigmatism: Some(astigmatism), ..stage };
+        assert_eq!(astigmatic.problem(), None);
+        let [by, deviation] = astigmatic.shift(0.3, [1.2, 0.0]);
+        assert!((by - 0.5).abs() < 1e-12 && (deviation - 0.15_f64.hypot(0.1)).abs() < 1e-12);
+        assert_eq!(astigmatic.shift(0.3, [f64::NAN, 0.0]), [0.0; 2]);
+        assert_eq!((astigmatic.shift(0.3, [0.2, 0.0]), stage.shift(0.3, [1.0, 0.0])), ([0.0; 2], [0.0; 2]));
         let mut falling = stage;
         falling.response[4] = -1.1;
         assert_eq!(falling.problem(), Some("response must rise"));

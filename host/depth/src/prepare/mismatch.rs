@@ -3,7 +3,7 @@
 
 use ndarray::{Array2, ArrayView2, s};
 
-use super::{PrepareSettings, finish};
+use super::{PrepareSettings, finish, noise::Blocks};
 use crate::optics::Optics;
 
 /// How one image of a pair was changed.
@@ -58,7 +58,8 @@ impl Mismatch {
         let settings = PrepareSettings { trust: true, ..*settings };
         Self::TURNS.into_iter().find(|turn| {
             let pair = [far.clone(), turn.undone(near.view())];
-            let found = finish(&mut None, pair, None, [None, None], optics, &settings);
+            let blocks = Blocks::of(pair[0].view(), pair[1].view());
+            let found = finish(&mut None, pair, None, [None, None], &blocks, optics, &settings);
             found.is_ok_and(|found| found.report.correlation.is_some_and(|after| after > RELATED))
         })
     }

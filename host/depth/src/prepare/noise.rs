@@ -2,8 +2,9 @@
 //!
 //! Both images pass the second difference along both axes (Immerkaer 1996), whose response peaks at the highest
 //! frequencies, towards (pi, pi). There defocus leaves little signal, proportional in both images. So the smaller
-//! eigenvalue of a block's covariance is the noise. Blocks of several brightnesses separate shot noise from the constant
-//! part. Cost: twenty additions per pixel of the blocks.
+//! eigenvalue of a block's covariance is the noise. Where both images have unlike noise, it is that of the more blurred
+//! one, as in the residual of the model. Blocks of several brightnesses separate shot noise from the constant part.
+//! Cost: twenty additions per pixel of the blocks.
 
 use ndarray::ArrayView2;
 use rayon::prelude::*;
@@ -45,7 +46,7 @@ pub struct PairNoise {
 
 impl PairNoise {
     /// Adds the error of a lossy coding of variance `coding`, of images with this mean `brightness`. The same
-    /// rounding removes fine noise, from which [`of_pair`] would measure that of the camera.
+    /// rounding removes fine noise, from which that of the camera would be measured.
     #[must_use]
     pub fn coded(self, coding: f64, brightness: f64) -> Self {
         if coding <= 0.0 || self.coding > 0.0 {
@@ -77,46 +78,56 @@ impl PairNoise {
     }
 }
 
-/// The noise of a pair of one size, from at most some 10,000 blocks in rows spread over it; pixels without a value
-/// (NaN) are ignored. `None` without a complete block.
-pub fn of_pair(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Option<PairNoise> {
-    let (height, width) = far.dim();
-    let [rows, columns] = [height, width].map(|n| n.saturating_sub(2) / BLOCK_PX);
-    let step = (rows * columns).div_ceil(ENOUGH).max(1);
-    let [far, near] = [&far, &near].map(|image| image.as_standard_layout());
-    let of_row = |index: usize| {
-        let of_blocks = energies([far.view(), near.view()], index * step * BLOCK_PX, columns);
-        of_blocks.into_iter().filter_map(|[of_far, of_near, of_both, brightness]| {
-            let apart = (0.5 * (of_far - of_near)).hypot(of_both);
-            let variance = (0.5 * (of_far + of_near) - apart) / SMALLER;
-            (variance.is_finite() && brightness.is_finite()).then_some([brightness, variance])
-        })
-    };
-    let mut blocks: Vec<[f64; 2]> = (0..rows.div_ceil(step)).into_par_iter().flat_map_iter(of_row).collect();
-    if blocks.is_empty() {
-        return None;
+/// What the noise of a pair is measured from: of each block the variance of the far image's highest frequencies, of the near
+/// one's, their covariance, and both means.
+#[derive(Default)]
+pub(crate) struct Blocks(Vec<[f64; 5]>);
+
+impl Blocks {
+    /// At most some 10,000 blocks of a pair of one size, in rows spread over it, without those that have pixels without a value
+    /// (NaN).
+    pub fn of(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Self {
+        let (height, width) = far.dim();
+        let [rows, columns] = [height, width].map(|n| n.saturating_sub(2) / BLOCK_PX);
+        let step = (rows * columns).div_ceil(ENOUGH).max(1);
+        let [far, near] = [&far, &near].map(|image| image.as_standard_layout());
+        let of_row = |index: usize| {
+            let of_blocks = energies([far.view(), near.view()], index * step * BLOCK_PX, columns);
+            of_blocks.into_iter().filter(|block| block.iter().all(|value| value.is_finite()))
+        };
+        Self((0..rows.div_ceil(step)).into_par_iter().flat_map_iter(of_row).collect())
     }
-    blocks.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
-    // There are blocks.
-    let median = |part: &[[f64; 2]], which: usize| {
-        median(part.iter().map(|block| block[which]).collect(), f64::total_cmp).unwrap_or_default()
-    };
-    let mean_variance = median(&blocks, 1);
-    // Medians of the darkest and of the brightest quarter determine the line.
-    let quarter = (blocks.len() / 4).max(1);
-    let [dark, bright] = [&blocks[..quarter], &blocks[blocks.len() - quarter..]];
-    let [from, to] = [dark, bright].map(|part| [median(part, 0), median(part, 1)]);
-    let slope = (to[1] - from[1]) / (to[0] - from[0]);
-    let tells = to[0] - from[0] > 0.1 * to[0].abs() && slope.is_finite() && slope > 0.0;
-    let per_unit = if tells { slope } else { 0.0 };
-    let constant = if tells { from[1] - slope * from[0] } else { mean_variance };
-    Some(PairNoise { constant, per_unit, mean_variance, ..PairNoise::default() })
+
+    /// The noise of the pair once the near image is divided by `gain`. `None` without a block.
+    pub fn noise(&self, gain: f64) -> Option<PairNoise> {
+        let of_block = |&[of_far, of_near, of_both, far, near]: &[f64; 5]| {
+            let [of_near, of_both] = [of_near / (gain * gain), of_both / gain];
+            let apart = (0.5 * (of_far - of_near)).hypot(of_both);
+            [0.5 * (far + near / gain), (0.5 * (of_far + of_near) - apart) / SMALLER]
+        };
+        let mut blocks: Vec<[f64; 2]> = self.0.iter().map(of_block).collect();
+        blocks.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
+        let median = |part: &[[f64; 2]], which: usize| {
+            median(part.iter().map(|block| block[which]).collect(), f64::total_cmp)
+        };
+        let mean_variance = median(&blocks, 1)?;
+        // Medians of the darkest and of the brightest quarter determine the line.
+        let quarter = (blocks.len() / 4).max(1);
+        let [dark, bright] = [&blocks[..quarter], &blocks[blocks.len() - quarter..]];
+        let line = |part| Some([median(part, 0)?, median(part, 1)?]);
+        let [from, to] = [line(dark)?, line(bright)?];
+        let slope = (to[1] - from[1]) / (to[0] - from[0]);
+        let tells = to[0] - from[0] > 0.1 * to[0].abs() && slope.is_finite() && slope > 0.0;
+        let per_unit = if tells { slope } else { 0.0 };
+        let constant = if tells { from[1] - slope * from[0] } else { mean_variance };
+        Some(PairNoise { constant, per_unit, mean_variance, ..PairNoise::default() })
+    }
 }
 
-/// Variance of the far image, of the near one, their covariance, and the mean brightness, of each block of a row.
-fn energies(images: [ArrayView2<f32>; 2], top: usize, columns: usize) -> Vec<[f64; 4]> {
+/// Variance of the far image, of the near one, their covariance, and the mean brightness of both, of each block of a row.
+fn energies(images: [ArrayView2<f32>; 2], top: usize, columns: usize) -> Vec<[f64; 5]> {
     let width = columns * BLOCK_PX;
-    let mut of_columns = [(); 4].map(|()| vec![0.0; width]);
+    let mut of_columns = [(); 5].map(|()| vec![0.0; width]);
     for y in top..top + BLOCK_PX {
         let rows = images.each_ref().map(|image| {
             [y, y + 1, y + 2].map(|y| image.row(y).to_slice().expect("made in standard layout"))
@@ -127,8 +138,8 @@ fn energies(images: [ArrayView2<f32>; 2], top: usize, columns: usize) -> Vec<[f6
     let of_block = |block: usize| {
         let sums =
             of_columns.each_ref().map(|of_columns| simd::sum(&of_columns[block..block + BLOCK_PX]) / pixels);
-        let [of_far, of_near, of_both, brightness] = sums;
-        [of_far / GAIN, of_near / GAIN, of_both / GAIN, brightness]
+        let [of_far, of_near, of_both, far, near] = sums;
+        [of_far / GAIN, of_near / GAIN, of_both / GAIN, far, near]
     };
     (0..width).step_by(BLOCK_PX).map(of_block).collect()
 }
@@ -154,9 +165,19 @@ mod tests {
                 Array2::from_shape_fn((height, width), |(y, x)| 0.2 + 0.02 * uniform(seed, y, x))
             });
             let expected = 0.93 * 0.02_f64.powi(2) / 12.0;
-            let found = of_pair(far.view(), near.view()).unwrap().mean_variance;
+            let blocks = Blocks::of(far.view(), near.view());
+            let found = blocks.noise(1.0).unwrap().mean_variance;
             // Four standard errors of the median of 3,844 blocks.
             assert!((found / expected - 1.0).abs() < 0.01, "{height} x {width}: {found} of {expected}");
+            // A pair that was scaled and balanced again has the noise of the far image's scale.
+            for [of_far, of_near] in [[0.25_f32, 1.0], [1.0, 0.5]] {
+                let blocks = Blocks::of((&far * of_far).view(), (&near * of_near).view());
+                let scaled = blocks.noise(f64::from(of_near / of_far)).unwrap().mean_variance;
+                assert!(
+                    (scaled / (f64::from(of_far).powi(2) * found) - 1.0).abs() < 1e-4,
+                    "{scaled} of {found}"
+                );
+            }
         }
     }
 }

@@ -63,14 +63,15 @@ fn halve_generic<L: Lanes>(values: &[f32], [a, b, c, d]: [f32; 4], to: &mut [f32
 }
 
 dispatch! {
-    /// For each column, adds the squares and the product of a pair's second differences along both axes, and its
-    /// brightness. `rows` are three of the far image and three of the near one, two columns wider than the sums.
-    fn add_energies(rows: [[&[f32]; 3]; 2], sums: [&mut [f32]; 4]) = add_energies_generic
+    /// For each column, adds the squares and the product of a pair's second differences along both axes, and the
+    /// brightness of both. `rows` are three of the far image and three of the near one, two columns wider than the sums.
+    fn add_energies(rows: [[&[f32]; 3]; 2], sums: [&mut [f32]; 5]) = add_energies_generic
 }
 
 #[inline(always)]
-fn add_energies_generic<L: Lanes>(rows: [[&[f32]; 3]; 2], [far, near, both, brightness]: [&mut [f32]; 4]) {
+fn add_energies_generic<L: Lanes>(rows: [[&[f32]; 3]; 2], sums: [&mut [f32]; 5]) {
     const TOGETHER: usize = 64;
+    let [far, near, both, far_light, near_light] = sums;
     let width = far.len();
     let [of_far, of_near] = rows;
     for begin in (0..width).step_by(TOGETHER) {
@@ -81,10 +82,8 @@ fn add_energies_generic<L: Lanes>(rows: [[&[f32]; 3]; 2], [far, near, both, brig
         add_products_generic::<L>(&a, &a, &mut far[begin..end]);
         add_products_generic::<L>(&b, &b, &mut near[begin..end]);
         add_products_generic::<L>(&a, &b, &mut both[begin..end]);
-        let (of_far, of_near) = (&of_far[1][begin + 1..=end], &of_near[1][begin + 1..=end]);
-        let brightness = &mut brightness[begin..end];
-        for x in 0..brightness.len() {
-            brightness[x] += 0.5 * (of_far[x] + of_near[x]);
+        for (light, row) in [(&mut *far_light, of_far[1]), (&mut *near_light, of_near[1])] {
+            light[begin..end].iter_mut().zip(&row[begin + 1..=end]).for_each(|(sum, value)| *sum += value);
         }
     }
 }
@@ -200,7 +199,7 @@ mod tests {
                 let rows = [3, 59].map(|seed| {
                     [0, 1, 2].map(|y| (0..width + 2).map(|x| value(seed, y, x)).collect::<Vec<f32>>())
                 });
-                let mut sums = [(); 4].map(|()| vec![1.0; width]);
+                let mut sums = [(); 5].map(|()| vec![1.0; width]);
                 let views = rows.each_ref().map(|rows| rows.each_ref().map(|row| &row[..]));
                 add_energies(backend, views, sums.each_mut().map(|sums| &mut sums[..]));
                 for x in 0..width {
@@ -209,8 +208,8 @@ mod tests {
                         let at = |i: usize| taps[i / 3] * taps[i % 3] * rows[i / 3][x + i % 3];
                         (0..9).map(at).sum::<f32>()
                     });
-                    let middle = 0.5 * (rows[0][1][x + 1] + rows[1][1][x + 1]);
-                    let expected = [a * a, b * b, a * b, middle].map(|value| 1.0 + value);
+                    let light = rows.each_ref().map(|rows| rows[1][x + 1]);
+                    let expected = [a * a, b * b, a * b, light[0], light[1]].map(|value| 1.0 + value);
                     assert_eq!(sums.each_ref().map(|sums| sums[x]), expected, "{backend:?} {width} {x}");
                 }
             }

@@ -31,8 +31,8 @@ pub const NEAR_HOME: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/cli/near
 /// An emulated rig for several commands, because each start of one translates the firmware again.
 pub struct SharedRig {
     child: Child,
-    port: String,
-    camera: String,
+    pub port: String,
+    pub camera: String,
 }
 
 impl SharedRig {

@@ -24,24 +24,12 @@ fn info_identifies_the_emulated_board() {
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn a_rig_behind_tcp_gives_a_pair_and_its_depth_after_a_capture_on_a_full_disk() {
     let folder = Folder::new();
-    let mut sim = std::process::Command::new(assert_cmd::cargo::cargo_bin("farnear-sim"))
-        .args(["run", "--tcp", "--faults", NEAR_HOME])
-        .stdin(std::process::Stdio::piped())
-        .stdout(std::process::Stdio::piped())
-        .spawn()
-        .expect("farnear-sim starts");
-    let mut line = String::new();
-    let output = sim.stdout.take().expect("piped");
-    std::io::BufRead::read_line(&mut std::io::BufReader::new(output), &mut line).expect("text");
-    let address: serde_json::Value = serde_json::from_str(&line).expect("JSON");
-    let [port, camera] = ["port", "camera"].map(|key| address[key].as_str().expect("text"));
-    let capture = ["rig", "capture", "--optics", rig_optics(), "--port", port, "--camera", camera];
+    let rig = SharedRig::start(NEAR_HOME);
+    let capture = ["rig", "capture", "--optics", rig_optics(), "--port", &rig.port, "--camera", &rig.camera];
     #[cfg(target_os = "linux")]
     fails_on_a_full_disk(&folder, &capture);
     // The next capture can use the same name.
     succeeds(farnear(&capture).args(["--out", &folder.text("pair")]));
-    drop(sim.stdin.take());
-    assert!(sim.wait().expect("it ends").success());
     let [far, near] = ["far.png", "near.png"].map(|file| folder.text(&format!("pair/{file}")));
     succeeds(&mut farnear(&["depth", &far, &near, "--optics", rig_optics(), "--median-px", "5"]));
     let (map, truth) = (folder.text("pair/depth.npy"), true_staircase());

@@ -1,5 +1,7 @@
 //! Checks for truncated files and unsupported formats.
 
+use std::ops::Range;
+
 use super::tiff_tags;
 
 pub(super) const RAW: &str = "it is a camera's raw file: develop it to a 16-bit TIFF, linear and without sharpening (with `dcraw -4 -T`, \
@@ -80,7 +82,9 @@ pub(super) fn unsupported(bytes: &[u8]) -> Option<&'static str> {
     let brands = bytes.get(8..length.clamp(8, bytes.len().max(8))).filter(|_| is_media).unwrap_or_default();
     let brands = brands.as_chunks::<4>().0;
     let brand = |names: &[&[u8; 4]]| brands.iter().any(|brand| names.contains(&brand));
-    let raw_magics: [&[u8]; 6] = [b"FUJIFILMCCD-RAW", b"IIRO", b"IIRS", b"MMOR", b"IIU\0", b"FOVb"];
+    // Of Fujifilm, Olympus, Panasonic, Sigma, Minolta and old Canon cameras.
+    let raw_magics: [&[u8]; 8] =
+        [b"FUJIFILMCCD-RAW", b"IIRO", b"IIRS", b"MMOR", b"IIU\0", b"FOVb", b"\0MRM", b"II\x1a\0\0\0HEAPCCDR"];
     if bytes.get(8..10) == Some(b"CR") && bytes.starts_with(b"II*\0")
         || brand(&[b"crx "])
         || raw_magics.iter().any(|magic| bytes.starts_with(magic))
@@ -134,26 +138,91 @@ pub(super) fn whole_jpeg(bytes: &[u8]) -> Option<Vec<u8>> {
     }
 }
 
-/// Markers of a JPEG with the data of their segments, up to the first that is incomplete.
-fn jpeg_segments(bytes: &[u8]) -> impl Iterator<Item = (u8, &[u8])> {
+/// Markers of a JPEG with the data of their segments and what follows these, up to the first that is incomplete.
+fn jpeg_segments(bytes: &[u8]) -> impl Iterator<Item = (u8, &[u8], &[u8])> {
     let mut at = 2;
     std::iter::from_fn(move || {
-        while bytes.get(at..at + 2)? == [0xff, 0xff] {
-            at += 1;
-        }
+        at += scan_length(bytes.get(at..)?);
         let &[0xff, marker, high, low] = bytes.get(at..at + 4)? else { return None };
         let end = at + 2 + usize::from(u16::from_be_bytes([high, low]));
         let data = bytes.get(at + 4..end)?;
         at = end;
-        Some((marker, data))
+        Some((marker, data, &bytes[end..]))
     })
+}
+
+/// Bytes before the next marker of a segment: data of a scan with its restart markers, or fill.
+fn scan_length(bytes: &[u8]) -> usize {
+    let begins = |two: &[u8]| two[0] == 0xff && !matches!(two[1], 0 | 0xff | 0xd0..=0xd7);
+    bytes.windows(2).position(begins).unwrap_or(bytes.len())
+}
+
+/// The first EXIF of a JPEG: longer ones continue in segments of the same mark.
+pub(super) fn jpeg_exif(bytes: &[u8]) -> Option<&[u8]> {
+    let mut segments = jpeg_segments(bytes).take_while(|(marker, ..)| *marker != 0xda);
+    segments.find_map(|(marker, data, _)| data.strip_prefix(b"Exif\0\0").filter(|_| marker == 0xe1))
+}
+
+/// Whether a JPEG with its end lacks data before it. A progressive one was cut between two scans if some coefficients lack their last
+/// bits (T.81, G.1.2); a copy may have left a part of a scan as zeros.
+pub(super) fn lacks_data(jpeg: &[u8]) -> bool {
+    /// No picture has as many where zeros encode coefficients: each block would have all of them.
+    const ZEROS: usize = 64;
+    /// Some cameras fill a scan up to its end, at most to the next page of memory.
+    const PADDING: usize = 4096;
+    // Components of a progressive frame with the coefficients that are whole.
+    let mut whole: Vec<(u8, [bool; 64])> = Vec::new();
+    let mut zeros_are_coefficients = [false; 256];
+    for (marker, mut data, after) in jpeg_segments(jpeg) {
+        match marker {
+            0xc2 => {
+                let components = data.get(6..).unwrap_or_default().chunks_exact(3);
+                whole = components.map(|component| (component[0], [false; 64])).collect();
+            }
+            0xc4 => {
+                while let [table, rest @ ..] = data {
+                    let Some((lengths, values)) = rest.split_at_checked(16) else { break };
+                    let count: usize = lengths.iter().map(|length| usize::from(*length)).sum();
+                    let Some((values, rest)) = values.split_at_checked(count) else { break };
+                    // The first value has the code of zeros; its lower half is the size of a coefficient.
+                    zeros_are_coefficients[usize::from(*table)] =
+                        values.first().is_some_and(|value| value & 15 != 0);
+                    data = rest;
+                }
+            }
+            0xda => {
+                let Some((count, rest)) = data.split_first() else { continue };
+                let Some((selectors, &[first, last, bits])) = rest.split_at_checked(2 * usize::from(*count))
+                else {
+                    continue;
+                };
+                let selectors = selectors.as_chunks::<2>().0;
+                let has_last_bits = |id: u8| bits & 15 == 0 && selectors.iter().any(|[of, _]| *of == id);
+                for (_, done) in whole.iter_mut().filter(|(id, _)| has_last_bits(*id)) {
+                    if let Some(part) = done.get_mut(usize::from(first)..=usize::from(last)) {
+                        part.fill(true);
+                    }
+                }
+                let of_zeros =
+                    |[_, tables]: &[u8; 2]| zeros_are_coefficients[0x10 | usize::from(tables & 15)];
+                let encodes = last > 0 && bits >> 4 == 0 && selectors.iter().any(of_zeros);
+                let mut zeros = after[..scan_length(after)].rsplit(|byte| *byte != 0).map(<[u8]>::len);
+                let at_end = zeros.next().unwrap_or(0);
+                if encodes && (at_end > PADDING || zeros.any(|zeros| zeros >= ZEROS)) {
+                    return true;
+                }
+            }
+            _ => {}
+        }
+    }
+    whole.iter().any(|(_, done)| done.contains(&false))
 }
 
 /// Why a JPEG of this coding is not read (T.81, table B.1; JPEG-LS), from the marker and precision of its frame.
 pub(super) fn unsupported_jpeg(bytes: &[u8]) -> Option<String> {
     // Colours of a frame whose scans hold all of them.
     let mut together = 0;
-    for (marker, data) in jpeg_segments(bytes) {
+    for (marker, data, _) in jpeg_segments(bytes) {
         let first = data.first().copied().unwrap_or(0);
         let coding = match marker {
             0xc2 if first == 8 => return None,
@@ -186,7 +255,7 @@ pub(super) fn jpeg_coding_variance(bytes: &[u8]) -> Option<f64> {
     const USED: std::ops::Range<f64> = 0.08..0.3;
     let mut tables: [Option<[f64; 64]>; 4] = [None; 4];
     let mut of_brightness = 0;
-    for (marker, mut data) in jpeg_segments(bytes) {
+    for (marker, mut data, _) in jpeg_segments(bytes) {
         match marker {
             0xdb => {
                 while let [kind, rest @ ..] = data {
@@ -239,14 +308,21 @@ pub(super) fn png_grey_bits(bytes: &[u8]) -> Option<u8> {
     (kind == 0 && bits < 8).then_some(bits)
 }
 
-fn png_chunk<'a>(bytes: &'a [u8], name: &[u8; 4]) -> Option<&'a [u8]> {
+/// Names of a PNG's chunks with their places, up to the first that is incomplete.
+pub(super) fn png_chunks(bytes: &[u8]) -> impl Iterator<Item = (&[u8; 4], Range<usize>)> {
     let mut at = 8;
-    loop {
-        let length = u32::from_be_bytes(bytes.get(at..at + 4)?.try_into().ok()?) as usize;
-        match bytes.get(at + 4..at + 8)? {
-            found if found == name => return bytes.get(at + 8..at.checked_add(length)?.checked_add(8)?),
-            b"IDAT" | b"IEND" => return None,
-            _ => at = at.checked_add(length)?.checked_add(12)?,
-        }
-    }
+    std::iter::from_fn(move || {
+        let (length, rest) = bytes.get(at..)?.split_first_chunk::<4>()?;
+        let end = at.checked_add(u32::from_be_bytes(*length) as usize)?.checked_add(12)?;
+        let (name, place): (&[u8; 4], _) = (rest.first_chunk()?, at..end);
+        bytes.get(place.clone())?;
+        at = end;
+        Some((name, place))
+    })
+}
+
+fn png_chunk<'a>(bytes: &'a [u8], name: &[u8; 4]) -> Option<&'a [u8]> {
+    let mut before = png_chunks(bytes).take_while(|(name, _)| !matches!(*name, b"IDAT" | b"IEND"));
+    let (_, place) = before.find(|(found, _)| *found == name)?;
+    bytes.get(place.start + 8..place.end - 4)
 }

@@ -93,7 +93,7 @@ fn jpeg(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     if let Some(advice) = complete::unsupported_jpeg(whole.as_deref().unwrap_or(bytes)) {
         return Err(advice);
     }
-    let bytes = whole.as_deref().ok_or(INCOMPLETE)?;
+    let bytes = whole.as_deref().filter(|whole| !complete::lacks_data(whole)).ok_or(INCOMPLETE)?;
     let options = DecoderOptions::default().set_max_width(usize::MAX).set_max_height(usize::MAX);
     let options = options.set_strict_mode(true);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
@@ -113,8 +113,7 @@ fn jpeg(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     if needs_more(bytes, &values, options, to) {
         return Err(INCOMPLETE.into());
     }
-    let orientation =
-        metadata::orientation(decoder.exif().map(Vec::as_slice), decoder.xmp().map(Vec::as_slice));
+    let orientation = metadata::orientation(complete::jpeg_exif(bytes), decoder.xmp().map(Vec::as_slice));
     let coding_variance = complete::jpeg_coding_variance(bytes).unwrap_or(0.0);
     let values = Values::U8(values);
     let (white_level, largest) = (None, None);
@@ -152,6 +151,7 @@ fn other(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     let numbered = if format == ImageFormat::Bmp { bmp::numbered(bytes) } else { None };
     let (bytes, palette): (Cow<'_, [u8]>, _) = match numbered {
         Some((numbered, palette)) => (Cow::Owned(numbered), Some(palette)),
+        None if format == ImageFormat::Png => (metadata::before_pixels(bytes), None),
         None => (Cow::Borrowed(bytes), None),
     };
     let bytes = &*bytes;

@@ -1,11 +1,10 @@
 //! Orientation and time of exposure from EXIF and XMP.
 
-use std::{io::Cursor, path::Path};
+use std::{borrow::Cow, io::Cursor, path::Path};
 
 use image::{ImageDecoder, ImageFormat, ImageReader};
-use zune_jpeg::{JpegDecoder, zune_core::bytestream::ZCursor};
 
-use super::tiff_tags;
+use super::{complete, tiff_tags};
 
 /// Orientation as in EXIF, 1 to 8; 1 = upright. EXIF comes before XMP.
 pub(super) fn orientation(exif: Option<&[u8]>, xmp: Option<&[u8]>) -> u8 {
@@ -20,12 +19,32 @@ fn of_xmp(xmp: &[u8]) -> Option<u8> {
     (1..=8).contains(&value).then_some(value)
 }
 
+/// A PNG with its EXIF, XMP and texts before the pixels, where decoders look for them. ExifTool writes them behind.
+pub(super) fn before_pixels(png: &[u8]) -> Cow<'_, [u8]> {
+    let mut chunks = complete::png_chunks(png).take_while(|(name, _)| *name != b"IEND");
+    let pixels = chunks.find(|(name, _)| *name == b"IDAT");
+    let behind = chunks.filter(|(name, _)| matches!(*name, b"eXIf" | b"iTXt" | b"tEXt" | b"zTXt"));
+    let behind: Vec<_> = behind.map(|(_, place)| place).collect();
+    let Some((_, pixels)) = pixels.filter(|_| !behind.is_empty()) else { return png.into() };
+    let mut ordered = png[..pixels.start].to_vec();
+    behind.iter().for_each(|place| ordered.extend_from_slice(&png[place.clone()]));
+    let mut at = pixels.start;
+    for place in behind {
+        ordered.extend_from_slice(&png[at..place.start]);
+        at = place.end;
+    }
+    ordered.extend_from_slice(&png[at..]);
+    ordered.into()
+}
+
 /// EXIF and XMP of an image that is neither JPEG nor TIFF.
 pub(super) fn of_decoder(
     decoder: &mut impl ImageDecoder,
     bytes: &[u8],
 ) -> (Option<Vec<u8>>, Option<Vec<u8>>) {
     let exif = decoder.exif_metadata().ok().flatten().or_else(|| raw_profile(bytes));
+    // Some programs keep the mark of a JPEG's segment.
+    let exif = exif.map(|exif| exif.strip_prefix(b"Exif\0\0").map(<[u8]>::to_vec).unwrap_or(exif));
     (exif, decoder.xmp_metadata().ok().flatten())
 }
 
@@ -44,8 +63,7 @@ fn raw_profile(bytes: &[u8]) -> Option<Vec<u8>> {
         .flat_map(str::chars)
         .filter_map(|digit| Some(digit.to_digit(16)? as u8))
         .collect();
-    let bytes: Vec<u8> = digits.chunks_exact(2).map(|two| 16 * two[0] + two[1]).collect();
-    Some(bytes.strip_prefix(b"Exif\0\0").map(<[u8]>::to_vec).unwrap_or(bytes))
+    Some(digits.chunks_exact(2).map(|two| 16 * two[0] + two[1]).collect())
 }
 
 /// Time of the exposure, `2026:11:25 20:15:03`, with the fraction of a second where it is stated.
@@ -58,13 +76,12 @@ pub fn exposure_time(bytes: &[u8]) -> Option<String> {
     let exif = if tiff_tags::is_tiff(bytes) {
         bytes.to_vec()
     } else if bytes.starts_with(b"\xff\xd8") {
-        let mut decoder = JpegDecoder::new(ZCursor::new(bytes));
-        decoder.decode_headers().ok()?;
-        decoder.exif()?.clone()
+        complete::jpeg_exif(bytes)?.to_vec()
     } else {
         let format: ImageFormat = image::guess_format(bytes).ok()?;
-        let mut decoder = ImageReader::with_format(Cursor::new(bytes), format).into_decoder().ok()?;
-        of_decoder(&mut decoder, bytes).0?
+        let bytes = if format == ImageFormat::Png { before_pixels(bytes) } else { bytes.into() };
+        let mut decoder = ImageReader::with_format(Cursor::new(&*bytes), format).into_decoder().ok()?;
+        of_decoder(&mut decoder, &bytes).0?
     };
     let directory = tiff_tags::directories(exif.as_slice()).ok()?.into_iter().next()?;
     let exposed = directory.exposed.or(directory.date_time)?;
@@ -75,7 +92,9 @@ pub fn exposure_time(bytes: &[u8]) -> Option<String> {
 pub(crate) mod tests {
     use std::fmt::Write;
 
-    use super::super::decode_grey;
+    use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+
+    use super::super::{complete, decode_grey};
 
     /// EXIF with an orientation, and the exposure's time in its own directory.
     fn exif(orientation: u8, time: &str) -> Vec<u8> {
@@ -108,6 +127,28 @@ pub(crate) mod tests {
         png(|encoder| encoder.add_ztxt_chunk("Raw profile type exif".into(), text).unwrap())
     }
 
+    const TIME: &str = "2026:11:25 20:00:00";
+
+    fn png_with_exif_chunk(exif: Vec<u8>) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let mut encoder = PngEncoder::new(&mut bytes);
+        encoder.set_exif_metadata(exif).unwrap();
+        encoder.write_image(&[0, 50, 100, 150, 200, 250], 3, 2, ExtendedColorType::L8).unwrap();
+        bytes
+    }
+
+    /// With the metadata behind the pixels.
+    fn appended(png: &[u8]) -> Vec<u8> {
+        let chunks = complete::png_chunks(png);
+        let (moved, others): (Vec<_>, Vec<_>) =
+            chunks.partition(|(name, _)| matches!(*name, b"eXIf" | b"iTXt" | b"zTXt"));
+        assert_eq!(moved.len(), 1);
+        let (end, others) = others.split_last().unwrap();
+        let chunks = others.iter().chain(&moved).chain([end]);
+        let chunks: Vec<u8> = chunks.flat_map(|(_, place)| png[place.clone()].to_vec()).collect();
+        [&png[..8], &chunks].concat()
+    }
+
     #[test]
     fn xmp_and_text_chunks_turn_an_image() {
         let xmp = |text: &str| {
@@ -117,12 +158,15 @@ pub(crate) mod tests {
         let files = [
             xmp("tiff:Orientation=\"6\"/>"),
             xmp("><tiff:Orientation>6</tiff:Orientation>"),
-            png_with_exif(6, "2026:11:25 20:00:00"),
+            png_with_exif(6, TIME),
+            png_with_exif_chunk(exif(6, TIME)),
+            png_with_exif_chunk([&b"Exif\0\0"[..], &exif(6, TIME)].concat()),
         ];
-        for file in files {
+        for file in files.iter().flat_map(|file| [file.clone(), appended(file)]) {
             let pixels = decode_grey(&file).unwrap().pixels.mapv(|v| (255.0 * v).round() as u8);
             assert_eq!(pixels, ndarray::array![[150, 0], [200, 50], [250, 100]]);
         }
+        assert_eq!(super::exposure_time(&appended(&files[2])), Some(format!("{TIME}.")));
         assert_eq!(decode_grey(&xmp("tiff:Orientation=\"9\"/>")).unwrap().pixels.dim(), (2, 3));
     }
 }

@@ -4,7 +4,7 @@ mod palette;
 
 use std::{
     fs::File,
-    io::{BufReader, Cursor, Read, Seek},
+    io::{self, BufReader, Cursor, Read, Seek, SeekFrom},
     path::{Path, PathBuf},
 };
 
@@ -217,8 +217,26 @@ fn unsupported(page: &Directory) -> Option<String> {
     }
 }
 
+/// Whether deflate data end in zeros, as a cut copy does in a file that had its size before. They end in a checksum, which the decoder
+/// does not read.
+fn ends_in_zeros(file: &mut (impl Read + Seek), page: &Directory) -> io::Result<bool> {
+    let mut end = [0; 64];
+    let [at, length] = page.last_strip;
+    let Some(before) = length.checked_sub(end.len() as u64) else { return Ok(false) };
+    let place = SeekFrom::Start(at.saturating_add(before));
+    // Some programs state too many bytes.
+    let is_there = file.seek(place).and_then(|_| file.read_exact(&mut end)).is_ok();
+    file.rewind()?;
+    Ok(is_there && end == [0; 64])
+}
+
 /// A page of a file of this size, upright.
-fn decode_page(file: impl Read + Seek, size: u64, page: &Page, signed: Signed) -> Result<Decoded, String> {
+fn decode_page(
+    mut file: impl Read + Seek,
+    size: u64,
+    page: &Page,
+    signed: Signed,
+) -> Result<Decoded, String> {
     let mut kind = page.directory.clone();
     if signed == Signed::AsUnsigned && kind.sample_format == 2 {
         kind.sample_format = 1;
@@ -246,6 +264,10 @@ fn decode_page(file: impl Read + Seek, size: u64, page: &Page, signed: Signed) -
     limits.decoding_buffer_size = usize::try_from(most_bytes(size)).unwrap_or(usize::MAX);
     limits.intermediate_buffer_size = limits.decoding_buffer_size;
     limits.ifd_value_size = usize::try_from(size).unwrap_or(usize::MAX).max(1 << 20);
+    let is_deflate = matches!(page.directory.compression, 8 | 32946);
+    if is_deflate && ends_in_zeros(&mut file, &page.directory).map_err(said)? {
+        return Err(INCOMPLETE.into());
+    }
     let file = palette::AsGrey::new(file, &page.directory);
     let mut decoder = Decoder::new(file).map_err(say)?.with_limits(limits);
     if page.index > 0 {

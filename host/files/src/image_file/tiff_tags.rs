@@ -109,6 +109,8 @@ pub(crate) struct Directory {
     pub compression: u64,
     pub strip_offset: u64,
     pub strips: u64,
+    /// Tags 273 and 279, or 324 and 325: place and length of the last strip or tile.
+    pub last_strip: [u64; 2],
     pub x_resolution: Option<f64>,
     pub y_resolution: Option<f64>,
     /// Tag 281.
@@ -249,7 +251,7 @@ impl<'a, S: Source + ?Sized> File<'a, S> {
         let field = at + 4 + inline as u64;
         let fits = count.checked_mul(size as u64).is_some_and(|bytes| bytes <= inline as u64);
         let place = if fits { field } else { self.number(field, inline)? };
-        let value = |index: u64| self.number(place.checked_add(index * size as u64)?, size);
+        let value = |index: u64| self.number(place.checked_add(index.checked_mul(size as u64)?)?, size);
         let text = || {
             let bytes = self.source.read(place, count.min(TEXT_MAX))?;
             // Old programs write Latin-1, whose codes are those of Unicode.
@@ -263,6 +265,7 @@ impl<'a, S: Source + ?Sized> File<'a, S> {
             above.zip(below).map(|(above, below)| above as f64 / below as f64)
         };
         let first = || value(0).unwrap_or(0);
+        let last = || value(count.saturating_sub(1)).unwrap_or(0);
         match tag {
             254 => directory.subfile = first(),
             255 => directory.old_subfile = first(),
@@ -276,9 +279,14 @@ impl<'a, S: Source + ?Sized> File<'a, S> {
             317 => directory.predictor = first(),
             322 => directory.tile_width = value(0),
             323 => directory.tile_length = value(0),
+            324 => directory.last_strip[0] = last(),
+            279 | 325 => directory.last_strip[1] = last(),
             270 => directory.description = text(),
             271 => directory.make = text(),
-            273 => (directory.strip_offset, directory.strips) = (first(), count),
+            273 => {
+                (directory.strip_offset, directory.strips) = (first(), count);
+                directory.last_strip[0] = last();
+            }
             274 => {
                 let integer = !matches!(kind, 2 | 5 | 7 | 10..=12);
                 let upright = |value: &u8| (1..=8).contains(value);

@@ -1,5 +1,5 @@
-//! The person's grey level in a folder of masks: 0 and 255, any two others, or a background model's labels (0, 127 and
-//! 255 of OpenCV; 0, 50, 85, 170 and 255 of ChangeDetection.net).
+//! The person's grey level in a folder of masks: 0 and 255, any two others, or a background model's labels (0, 127 or
+//! 128, and 255 of OpenCV and others; 0, 50, 85, 170 and 255 of ChangeDetection.net).
 
 use std::path::{Path, PathBuf};
 
@@ -9,9 +9,9 @@ use super::{MaskError, grey};
 use crate::{image_file::Reading, video::pictures};
 
 /// Levels that label more than a person: shadow, not evaluated, unknown.
-const LABELS: [u8; 6] = [0, 50, 85, 127, 170, 255];
-/// OpenCV's shadow: with 0 alone it does not identify the person's level.
-const SHADOW: u8 = 127;
+const LABELS: [u8; 7] = [0, 50, 85, 127, 128, 170, 255];
+/// Shadow of OpenCV and others: with 0 alone it does not identify the person's level.
+const SHADOW: [u8; 2] = [127, 128];
 /// Surveyed pictures of a folder; more while they hold one level only.
 const SURVEYED: usize = 8;
 /// JPEG rings: levels this near to black or white (part of the range) are those, save one pixel in [`ONE_BETWEEN_IN`].
@@ -21,6 +21,8 @@ const ONE_BETWEEN_IN: u64 = 50;
 const FEW: usize = 6;
 /// Largest share of people in a frame, per cent.
 const MOST_PEOPLE: u64 = 70;
+/// Largest share of people in the border of frames, per cent.
+const MOST_OF_BORDER: u64 = 75;
 /// Two levels nearer than this with others between them are a picture, not a mask.
 const LEAST_GAP: u8 = 40;
 
@@ -31,19 +33,22 @@ pub struct Levels {
     pub remark: Option<String>,
     /// Share of the surveyed pixels that are set, per cent.
     pub percent_set: u64,
+    /// Of the pixels at the border of the pictures.
+    pub percent_of_border: u64,
     pub reading: Reading,
 }
 
 #[derive(Clone, Debug)]
 pub struct Histogram {
     counts: [u64; 256],
+    border: [u64; 256],
     reading: Reading,
 }
 
 impl Histogram {
     #[must_use]
     pub fn new(reading: Reading) -> Self {
-        Self { counts: [0; 256], reading }
+        Self { counts: [0; 256], border: [0; 256], reading }
     }
 
     /// Reads pictures throughout a folder until the person's level is among them.
@@ -70,6 +75,12 @@ impl Histogram {
         for &level in picture {
             self.counts[usize::from(level)] += 1;
         }
+        let (height, width) = picture.dim();
+        for ((row, column), &level) in picture.indexed_iter() {
+            if row == 0 || column == 0 || row + 1 == height || column + 1 == width {
+                self.border[usize::from(level)] += 1;
+            }
+        }
     }
 
     fn present(&self) -> Vec<u8> {
@@ -89,7 +100,7 @@ impl Histogram {
     /// Whether other pictures of the folder may hold the person's level.
     fn undecided(&self) -> bool {
         let present = self.present();
-        present.len() < 2 || present == [0, SHADOW]
+        present.len() < 2 || SHADOW.iter().any(|shadow| present == [0, *shadow])
     }
 
     /// The levels of masks; `None` for other pictures.
@@ -132,9 +143,12 @@ impl Histogram {
     }
 
     fn set_from(&self, set_from: u8, remark: Option<String>) -> Levels {
-        let all: u64 = self.counts.iter().sum();
-        let set: u64 = self.counts[usize::from(set_from)..].iter().sum();
-        Levels { set_from, remark, percent_set: 100 * set / all.max(1), reading: self.reading }
+        let percent = |counts: &[u64; 256]| {
+            let all: u64 = counts.iter().sum();
+            100 * counts[usize::from(set_from)..].iter().sum::<u64>() / all.max(1)
+        };
+        let (percent_set, percent_of_border) = (percent(&self.counts), percent(&self.border));
+        Levels { set_from, remark, percent_set, percent_of_border, reading: self.reading }
     }
 }
 
@@ -149,7 +163,13 @@ fn listed(levels: &[u8]) -> String {
 
 impl Default for Levels {
     fn default() -> Self {
-        Self { set_from: 128, remark: None, percent_set: 0, reading: Reading::default() }
+        Self {
+            set_from: 128,
+            remark: None,
+            percent_set: 0,
+            percent_of_border: 0,
+            reading: Reading::default(),
+        }
     }
 }
 
@@ -172,10 +192,11 @@ impl Levels {
 
     /// Refuses full frames whose background is set.
     pub fn check_people(&self, path: &Path) -> Result<(), MaskError> {
-        match self.percent_set {
-            percent @ MOST_PEOPLE.. => Err(MaskError::Inverted { path: path.into(), percent }),
-            _ => Ok(()),
+        let percent = self.percent_set;
+        if percent >= MOST_PEOPLE || self.percent_of_border >= MOST_OF_BORDER {
+            return Err(MaskError::Inverted { path: path.into(), percent });
         }
+        Ok(())
     }
 }
 
@@ -208,7 +229,11 @@ mod tests {
 
     #[test]
     fn shadow_and_unknown_labels_are_not_the_person() {
-        for labels in [&[(0, 9), (127, 9), (255, 9)][..], &[(0, 9), (50, 9), (85, 9), (170, 9), (255, 9)]] {
+        for labels in [
+            &[(0, 9), (127, 9), (255, 9)][..],
+            &[(0, 9), (128, 9), (255, 9)],
+            &[(0, 9), (50, 9), (85, 9), (170, 9), (255, 9)],
+        ] {
             let found = levels(labels).expect("masks");
             assert_eq!(found.set_from, 255);
             assert!(found.remark.is_some());
@@ -231,6 +256,15 @@ mod tests {
         let people = |counts: &[(u8, u64)]| of_masks(counts)?.check_people(Path::new("masks"));
         assert!(matches!(people(&[(0, 90), (255, 910)]), Err(MaskError::Inverted { percent: 91, .. })));
         assert!(people(&[(0, 400), (255, 600)]).is_ok());
+        // A large person, black in front of white.
+        let picture = Array2::from_shape_fn((40, 30), |(row, column)| {
+            if row > 2 && row < 37 && column > 5 && column < 25 { 0 } else { 255 }
+        });
+        let mut histogram = Histogram::new(Reading::default());
+        histogram.add(&picture);
+        let levels = Levels::of_masks(&histogram, Path::new("m.png")).expect("two levels");
+        let found = levels.check_people(Path::new("masks"));
+        assert!(matches!(found, Err(MaskError::Inverted { percent: 46, .. })), "{found:?}");
         assert!(of_masks(&[(0, 900), (3, 9), (5, 9), (250, 9), (253, 9), (255, 90)]).is_ok());
     }
 

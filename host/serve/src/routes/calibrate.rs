@@ -5,7 +5,7 @@ use std::{
     path::{Path as FsPath, PathBuf},
 };
 
-use axum::{Json, extract::State, http::StatusCode};
+use axum::{Json, extract::State};
 use farnear_depth::{calibrate::Model, corrections::Method, optics::OpticsFile};
 use farnear_workflows::{
     Context, WorkflowError,
@@ -132,9 +132,10 @@ async fn taught(State(app): Shared) -> Result<Json<Taught>, Failure> {
 }
 
 async fn find_psf(State(app): Shared, Body(asked): Body<PsfRequest>) -> Result<Json<Begun>, Failure> {
-    let bad = |error: String| Failure::new(StatusCode::BAD_REQUEST, error);
-    let model: Model =
-        asked.model.parse().map_err(|error| bad(format!("model {:?}: {error}", asked.model)))?;
+    let model: Model = asked
+        .model
+        .parse()
+        .map_err(|error| Failure::bad_request(format!("model {:?}: {error}", asked.model)))?;
     let mut request =
         CalibratePsfRequest { optics: app.optics_file(), model, ..CalibratePsfRequest::default() };
     let mut add = |folder: &FsPath, depth_mm: f64| {
@@ -150,7 +151,7 @@ async fn find_psf(State(app): Shared, Body(asked): Body<PsfRequest>) -> Result<J
         }
     }
     if request.images.is_empty() {
-        return Err(bad("no pair was chosen: capture a flat, textured target first".into()));
+        return Err(Failure::bad_request("no pair was chosen: capture a flat, textured target first"));
     }
     let work = move |_: &App, context: &Context<'_>| request.run(context);
     begin_computing(&app, Task::new("psf", "Find the point spread function", work))

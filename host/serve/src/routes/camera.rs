@@ -1,6 +1,6 @@
 use std::str::FromStr;
 
-use axum::{Json, extract::State, http::StatusCode};
+use axum::{Json, extract::State};
 use farnear_capture::camera::Setting;
 use farnear_workflows::{Context, camera, rig::RigAddress};
 use schemars::JsonSchema;
@@ -35,9 +35,8 @@ pub fn routes(api: Api) -> Api {
 }
 
 async fn set(State(app): Shared, Body(request): Body<CameraRequest>) -> Result<Json<Begun>, Failure> {
-    let wrong = |reason: String| Failure::new(StatusCode::BAD_REQUEST, reason);
-    let wished: Vec<Setting> =
-        request.set.iter().map(|text| Setting::from_str(text)).collect::<Result<_, _>>().map_err(wrong)?;
+    let wished: Result<Vec<_>, _> = request.set.iter().map(|text| Setting::from_str(text)).collect();
+    let wished = wished.map_err(Failure::bad_request)?;
     let alone = app.has_camera_alone();
     let rig = if alone { None } else { Some(RigAddress::Open(connected(&app)?)) };
     let mut camera = app.camera();

@@ -5,7 +5,7 @@ use std::time::Duration;
 use axum::{
     Json,
     extract::{Path, Query, State},
-    http::{Method, StatusCode},
+    http::Method,
 };
 use farnear_workflows::{
     Context,
@@ -267,14 +267,10 @@ async fn capture(
         }
         CaptureRequest::Series { pairs, interval_s } => {
             if !(0.0..=86_400.0).contains(&interval_s) {
-                let expected = format!("interval_s {interval_s}: expected 0 to 86400");
-                return Err(Failure::new(StatusCode::BAD_REQUEST, expected));
+                return Err(Failure::bad_request(format!("interval_s {interval_s}: expected 0 to 86400")));
             }
             if !(1..=SERIES_MAX).contains(&pairs) {
-                return Err(Failure::new(
-                    StatusCode::BAD_REQUEST,
-                    format!("pairs {pairs}: expected 1 to {SERIES_MAX}"),
-                ));
+                return Err(Failure::bad_request(format!("pairs {pairs}: expected 1 to {SERIES_MAX}")));
             }
             let out = free("series", pairs)?;
             let interval = Duration::from_secs_f64(interval_s);

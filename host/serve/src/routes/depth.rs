@@ -145,9 +145,8 @@ async fn compute(
     let folder = sessions::existing(&app.session, &name)?;
     let CaptureDepthRequest { corrected, variant, mut options } = asked;
     let operators = options.remove("operators").filter(|value| !value.is_null());
-    let refused = |message: String| Failure::new(StatusCode::BAD_REQUEST, message);
     let options: DepthRequest =
-        request::parse(options, Paths::Refused).map_err(|error| refused(error.to_string()))?;
+        request::parse(options, Paths::Refused).map_err(|error| Failure::bad_request(error.to_string()))?;
     // A path would let the page read any file as operators.
     let is_name = |text: &&str| text.chars().all(|c| c.is_ascii_alphanumeric() || ":-".contains(c));
     let operators = match operators {
@@ -156,7 +155,7 @@ async fn compute(
             value
                 .as_str()
                 .filter(is_name)
-                .ok_or_else(|| refused(format!("operators {value}: expected FAMILY:DESIGN")))?
+                .ok_or_else(|| Failure::bad_request(format!("operators {value}: expected FAMILY:DESIGN")))?
                 .into(),
         ),
     };

@@ -6,7 +6,7 @@ use axum::{
     Json,
     body::Body as AxumBody,
     extract::{Path, State},
-    http::{StatusCode, header},
+    http::header,
     response::{IntoResponse, Response},
 };
 use farnear_shadow::{CameraFile, camera};
@@ -259,7 +259,7 @@ async fn mask(
     let folder = sessions::entry_of(&result, &masks, "masks")?;
     let path = sessions::entry_of(&folder, &file, "mask")?;
     if path.extension().is_none_or(|ending| ending != "png") {
-        return Err(Failure::new(StatusCode::BAD_REQUEST, format!("file {file}: expected a mask, NAME.png")));
+        return Err(Failure::bad_request(format!("file {file}: expected a mask, NAME.png")));
     }
     let missing = move || Failure::missing(&format!("mask {file}"));
     let opened = aside(move || match result.is_symlink() || folder.is_symlink() {

@@ -1,6 +1,7 @@
 //! Motion of the rig, and its live view.
 
 use axum::{Json, extract::State, http::StatusCode};
+use farnear_depth::focus_measure::{FocusError, FocusMeasure};
 use farnear_protocol::{Micros, message::Axis};
 use farnear_workflows::{
     Context, WorkflowError,
@@ -177,10 +178,8 @@ fn connect_again(app: &App, prepare: impl FnOnce()) -> Result<Json<Done>, Failur
 }
 
 async fn set_scene(State(app): Shared, Body(Scene { scene }): Body<Scene>) -> Result<Json<Done>, Failure> {
-    let given =
-        app.address.as_ref().filter(|address| address.is_emulated()).ok_or_else(|| {
-            Failure::new(StatusCode::BAD_REQUEST, "only an emulated rig can change its scene")
-        })?;
+    let given = app.address.as_ref().filter(|address| address.is_emulated());
+    let given = given.ok_or_else(|| Failure::bad_request("only an emulated rig can change its scene"))?;
     let address = match given.scene().as_ref() == Some(&scene) {
         true => given.clone(), // it may be a file
         false => given.with_scene(known(scene, &app)?)?,
@@ -198,7 +197,7 @@ fn known(scene: String, app: &App) -> Result<String, Failure> {
         Some(mm) if mm > focal_length_mm && mm.is_finite() => return Ok(scene),
         Some(_) => format!("a distance beyond the focal length of {focal_length_mm} mm"),
     };
-    Err(Failure::new(StatusCode::BAD_REQUEST, format!("scene {scene:?}: expected {expected}")))
+    Err(Failure::bad_request(format!("scene {scene:?}: expected {expected}")))
 }
 
 async fn home(
@@ -232,10 +231,8 @@ async fn go(State(app): Shared, Body(request): Body<Goto>) -> Result<Json<Begun>
     begin(&app, Task::new("goto", title, move |_, context| goto::goto(&settings, context)))
 }
 
-fn measure(name: &str) -> Result<farnear_depth::focus_measure::FocusMeasure, Failure> {
-    name.parse().map_err(|error: farnear_depth::focus_measure::FocusError| {
-        Failure::new(StatusCode::BAD_REQUEST, error.to_string())
-    })
+fn measure(name: &str) -> Result<FocusMeasure, Failure> {
+    name.parse().map_err(|error: FocusError| Failure::bad_request(error.to_string()))
 }
 
 async fn seek(
@@ -266,10 +263,9 @@ async fn live(State(app): Shared, Body(request): Body<LiveRequest>) -> Result<Js
     let min_us = limit("exposure_min_us").unwrap_or(1);
     let max_us = limit("exposure_max_us").unwrap_or(EXPOSURE_MAX_US);
     if let Some(us) = request.exposure_us.filter(|us| !(min_us..=max_us).contains(us)) {
-        let error = format!("exposure_us {us}: expected {min_us} to {max_us} us");
-        return Err(Failure::new(StatusCode::BAD_REQUEST, error));
+        return Err(Failure::bad_request(format!("exposure_us {us}: expected {min_us} to {max_us} us")));
     }
-    let wrong = |reason: String| Failure::new(StatusCode::BAD_REQUEST, format!("light_percent: {reason}"));
+    let wrong = |reason: String| Failure::bad_request(format!("light_percent: {reason}"));
     let light = request.light_percent.map(light_of_percent).transpose().map_err(wrong)?;
     let measure = request.measure.as_deref().map(measure).transpose()?;
     app.set_live(|live| {

@@ -171,7 +171,7 @@ impl Extractor {
     ) -> Result<Extracted, E> {
         let Sighted { people, labels, shift, seen } = self.sighted(frame, self.rate())?;
         let mut subject = match people {
-            Ok((_, people)) => self.chooser.among(people, labels.dim()),
+            Ok((_, people)) => self.chooser.among(self.feedback.walkers(people), labels.dim()),
             Err(flag) => {
                 Subject { mask: Array2::from_elem(labels.dim(), false), bounds: None, flags: vec![flag] }
             }

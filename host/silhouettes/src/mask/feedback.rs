@@ -1,5 +1,6 @@
 //! Feedback from people to the background, which would learn a motionless person within seconds. A region that entered
-//! over the picture's edge or walked is a person for as long as it exists. A region that appears and never moves is
+//! over the picture's edge or walked is a person for as long as it exists. People who meet are one region, and people
+//! again when they part. A region that appears and never moves, or grows to one side as a door that opens, is
 //! furniture, a change of light, or a hole left by a person who was part of the background; it is learned. The outline
 //! of a hole is sharper in the background than in the frame. A hole shows the background, which is learned at once.
 
@@ -16,6 +17,8 @@ const STOPPED_FRAMES: u32 = 25;
 const OUTLINE_FRAMES: u32 = 50;
 /// Distance from the first place after which a region has walked, in heights.
 const WALKED: f64 = 0.2;
+/// Sides of a region's box within its height over this are in place.
+const IN_PLACE: usize = 15;
 const REMEMBERED_FRAMES: u32 = 10;
 /// Margin around people that is not learned: picture height over this.
 const MARGIN: usize = 60;
@@ -27,11 +30,33 @@ const ASIDE_PX: isize = 3;
 #[derive(Clone, Debug)]
 struct Track {
     bounds: BoundingBox,
+    first: BoundingBox,
     middle: (f64, f64),
     origin: (f64, f64),
     walked: bool,
+    /// Other people in the same region.
+    hidden: usize,
     still_frames: u32,
     unseen_frames: u32,
+}
+
+impl Track {
+    fn new(person: &Person, walked: bool) -> Self {
+        Self {
+            bounds: person.bounds,
+            first: person.bounds,
+            middle: person.centroid(),
+            origin: person.centroid(),
+            walked,
+            hidden: 0,
+            still_frames: 0,
+            unseen_frames: 0,
+        }
+    }
+
+    fn is_person(&self) -> bool {
+        self.walked || self.hidden > 0
+    }
 }
 
 /// Follows regions and decides where nothing is learned.
@@ -63,8 +88,17 @@ impl Feedback {
     pub fn stopped(&self, bounds: BoundingBox) -> bool {
         let track = self.tracks.iter().max_by_key(|track| shared(track.bounds, bounds));
         track.is_some_and(|track| {
-            shared(track.bounds, bounds) > 0 && track.walked && track.still_frames >= STOPPED_FRAMES
+            shared(track.bounds, bounds) > 0 && track.is_person() && track.still_frames >= STOPPED_FRAMES
         })
+    }
+
+    /// Those of a followed frame's people who entered or walked; all if none of them did.
+    #[must_use]
+    pub fn walkers(&self, people: Vec<Person>) -> Vec<Person> {
+        let walked = |person: &Person| {
+            self.tracks.iter().any(|track| track.is_person() && track.bounds == person.bounds)
+        };
+        if people.iter().any(walked) { people.into_iter().filter(walked).collect() } else { people }
     }
 
     /// Adds the people of a frame and returns the pixels of holes, if any; `background` is the empty scene for the
@@ -77,49 +111,38 @@ impl Feedback {
     ) -> Option<Mask> {
         let mut order: Vec<&Person> = people.iter().collect();
         order.sort_by_key(|person| std::cmp::Reverse(person.area));
-        let mut tracks = Vec::with_capacity(order.len());
         let size = self.size;
         let (mut held, mut holes) = (None, None);
         let paint = |person: &Person, mask: &mut Option<Mask>| {
             let mask = mask.get_or_insert_with(|| Mask::from_elem(size, false));
             person.fragments.iter().for_each(|fragment| fragment.paint(mask, true));
         };
-        for person in order {
-            let mut track = self.taken(person.bounds).unwrap_or_else(|| Track {
-                bounds: person.bounds,
-                middle: person.centroid(),
-                origin: person.centroid(),
-                walked: false,
-                still_frames: 0,
-                unseen_frames: 0,
-            });
+        let (found, mut tracks) = self.assigned(&order);
+        for (person, mut track) in order.into_iter().zip(found) {
             let middle = person.centroid();
             let height = person.bounds.height() as f64;
             let step = (middle.0 - track.middle.0).hypot(middle.1 - track.middle.1);
             track.still_frames =
                 if step <= STANDING * height { track.still_frames.saturating_add(1) } else { 0 };
             let way = (middle.0 - track.origin.0).hypot(middle.1 - track.origin.1);
-            track.walked |= way >= WALKED * height || person.bounds.touches_edge(self.size);
+            let at_edge = person.bounds.touches_edge(self.size);
+            let hinged = hinged(track.first, person.bounds) && !at_edge;
+            // Another person moves the middle of a region, too, and one who came through a door was one region with it.
+            track.walked |= (way >= WALKED * height && !hinged && track.hidden == 0) || at_edge;
+            track.walked &= !(hinged && track.still_frames >= STOPPED_FRAMES);
             (track.bounds, track.middle, track.unseen_frames) = (person.bounds, middle, 0);
             if track.still_frames % OUTLINE_FRAMES == STOPPED_FRAMES {
                 let mask = person.mask(self.size);
                 let empty = background();
                 if sharpness(&mask, Frame::Rgb(empty.view())) > HOLE * sharpness(&mask, frame) {
-                    (track.walked, track.origin) = (false, middle);
+                    (track.walked, track.hidden, track.origin) = (false, 0, middle);
                     paint(person, &mut holes);
                 }
             }
-            if track.walked {
+            if track.is_person() {
                 paint(person, &mut held);
             }
             tracks.push(track);
-        }
-        // Briefly undetected people keep their last place.
-        for mut track in self.tracks.drain(..) {
-            track.unseen_frames += 1;
-            if track.unseen_frames <= REMEMBERED_FRAMES && track.walked {
-                tracks.push(track);
-            }
         }
         self.tracks = tracks;
         let margin = (self.size.0 / MARGIN).max(2);
@@ -132,10 +155,43 @@ impl Feedback {
         holes
     }
 
+    /// The track of each person, with its last place, and those of briefly undetected people, who keep theirs. People
+    /// whose place is in another's region are hidden there; a new region where people were hidden is one of them.
+    fn assigned(&mut self, people: &[&Person]) -> (Vec<Track>, Vec<Track>) {
+        let mut found: Vec<Track> = Vec::with_capacity(people.len());
+        for person in people {
+            let track = self.taken(person.bounds).unwrap_or_else(|| {
+                let from = found
+                    .iter_mut()
+                    .find(|track| track.hidden > 0 && shared(track.bounds, person.bounds) > 0);
+                Track::new(person, from.map(|track| track.hidden -= 1).is_some())
+            });
+            found.push(track);
+        }
+        let mut undetected = Vec::new();
+        for mut track in self.tracks.drain(..).filter(Track::is_person) {
+            track.unseen_frames += 1;
+            match people.iter().position(|person| shared(person.bounds, track.bounds) > 0) {
+                Some(index) => found[index].hidden += 1 + track.hidden,
+                None if track.unseen_frames <= REMEMBERED_FRAMES => undetected.push(track),
+                None => {}
+            }
+        }
+        (found, undetected)
+    }
+
     fn taken(&mut self, bounds: BoundingBox) -> Option<Track> {
         let best = (0..self.tracks.len()).max_by_key(|&index| shared(self.tracks[index].bounds, bounds))?;
         (shared(self.tracks[best].bounds, bounds) > 0).then(|| self.tracks.swap_remove(best))
     }
+}
+
+/// Whether three sides are in place and the fourth is not: a door, a drawer or a curtain.
+fn hinged(first: BoundingBox, now: BoundingBox) -> bool {
+    let tolerance = (now.height() / IN_PLACE).max(2);
+    let sides = |bounds: BoundingBox| [bounds.top, bounds.bottom, bounds.left, bounds.right];
+    let in_place = sides(first).into_iter().zip(sides(now)).filter(|(a, b)| a.abs_diff(*b) <= tolerance);
+    in_place.count() == 3
 }
 
 fn shared(a: BoundingBox, b: BoundingBox) -> usize {
@@ -177,4 +233,84 @@ fn sharpness(mask: &Mask, frame: Frame<'_>) -> f64 {
 fn mean(pixels: ArrayView3<'_, u8>, row: usize, column: usize) -> f64 {
     let channels = pixels.dim().2;
     (0..channels).map(|channel| f64::from(pixels[[row, column, channel]])).sum::<f64>() / channels as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::{Array2, Array3, s};
+
+    use super::*;
+    use crate::mask::{people::people, subject::SubjectSettings};
+
+    const SIZE: (usize, usize) = (100, 100);
+
+    fn follow(feedback: &mut Feedback, boxes: &[(usize, usize)]) -> Vec<Person> {
+        let mut mask = Mask::from_elem(SIZE, false);
+        for &(left, right) in boxes {
+            mask.slice_mut(s![20..80, left..right]).fill(true);
+        }
+        let people = people(mask.view(), &SubjectSettings::for_size(SIZE));
+        let frame = Array2::zeros(SIZE);
+        feedback.follow(&people, Frame::Grey(frame.view()), || Array3::zeros((SIZE.0, SIZE.1, 3)));
+        people
+    }
+
+    #[test]
+    fn a_door_that_opens_is_not_a_person() {
+        let mut feedback = Feedback::new(SIZE);
+        for step in 0..30 {
+            follow(&mut feedback, &[(40, 43 + step)]);
+        }
+        assert!(feedback.held().is_none());
+        // A person comes through it and walks on.
+        let mut people = Vec::new();
+        for step in 0..60 {
+            let left = 30_usize.saturating_sub(step).max(5);
+            people = follow(&mut feedback, &[(40, 72), (left, left + 12)]);
+        }
+        assert_eq!(people.len(), 2);
+        let held = feedback.held().expect("the person");
+        assert!(held[[50, 8]] && !held[[50, 60]]);
+        let walkers = feedback.walkers(people);
+        assert_eq!(walkers.iter().map(|person| person.bounds.left).collect::<Vec<_>>(), [5]);
+    }
+
+    #[test]
+    fn a_standing_person_is_one_after_another_walked_past() {
+        let mut feedback = Feedback::new(SIZE);
+        for step in 0..40 {
+            follow(&mut feedback, &[(step, step + 14)]);
+        }
+        for step in 0..90 {
+            let left = 99_usize.saturating_sub(step);
+            let people = follow(&mut feedback, &[(39, 53), (left, (left + 18).min(100))]);
+            let held = feedback.held().expect("both");
+            assert!(held[[50, 45]] && held[[50, left]], "step {step}");
+            assert_eq!(feedback.walkers(people.clone()).len(), people.len(), "step {step}");
+        }
+        for _ in 0..30 {
+            follow(&mut feedback, &[(39, 53)]);
+        }
+        let people = follow(&mut feedback, &[(39, 53)]);
+        assert!(feedback.held().is_some() && feedback.stopped(people[0].bounds));
+        // A chair that appears is not one.
+        for step in 0..60 {
+            follow(
+                &mut feedback,
+                &[(39_usize.saturating_sub(step), 53_usize.saturating_sub(step)), (55, 70)],
+            );
+        }
+        assert!(feedback.held().is_none_or(|held| !held[[50, 60]]));
+    }
+
+    #[test]
+    fn a_region_that_walked_is_a_person_and_one_alone_is_kept() {
+        let mut feedback = Feedback::new(SIZE);
+        let people = follow(&mut feedback, &[(40, 60)]);
+        assert_eq!(feedback.walkers(people).len(), 1);
+        for step in 0..15 {
+            follow(&mut feedback, &[(40 + step, 60 + step)]);
+        }
+        assert!(feedback.held().is_some());
+    }
 }

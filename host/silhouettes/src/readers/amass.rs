@@ -16,8 +16,20 @@ pub const READER: Reader = Reader {
     read: |bytes, _| read(bytes),
 };
 
-const POSITIONS: [&str; 8] =
-    ["joints", "Jtr", "jtr", "joints3d", "joints_3d", "keypoints3d", "joint_positions", "positions"];
+const POSITIONS: [&str; 12] = [
+    "joints",
+    "Jtr",
+    "jtr",
+    "joints3d",
+    "joints3D",
+    "joints_3d",
+    "pred_joints",
+    "smpl_joints",
+    "keypoints3d",
+    "kp3d",
+    "joint_positions",
+    "positions",
+];
 const RATES: [&str; 4] = ["mocap_framerate", "mocap_frame_rate", "fps", "framerate"];
 /// Body joints of all SMPL models in order; hands and face follow.
 const SMPL: [&str; 22] = [
@@ -190,10 +202,25 @@ fn array(name: &str, bytes: &[u8]) -> Result<Array, RecordingError> {
     if !found.values.is_empty() && found.values.len() < expected {
         return Err(bad(&format!("{} of {expected} values are there: it was cut short", found.values.len())));
     }
-    if fortran && found.shape.len() > 1 {
-        return Err(bad("it is in Fortran's order, expected C's"));
+    if fortran && found.values.len() == expected {
+        found.values = in_c_order(&found.values, &found.shape);
     }
     Ok(found)
+}
+
+/// Values whose first index changes fastest, with the last one changing fastest.
+fn in_c_order(values: &[f64], shape: &[usize]) -> Vec<f64> {
+    let place = |index: usize| {
+        let mut stride = values.len();
+        let (mut rest, mut at) = (index, 0);
+        for &length in shape.iter().rev() {
+            stride /= length;
+            at += rest % length * stride;
+            rest /= length;
+        }
+        at
+    };
+    (0..values.len()).filter_map(|index| values.get(place(index)).copied()).collect()
 }
 
 /// IEEE 754 binary16.
@@ -293,6 +320,16 @@ mod tests {
         let complex = npz(&[("joints", npy("<c8", "(1, 22, 3)", &vec![0; 66 * 8]))]);
         let error = read(&complex).expect_err("complex numbers").to_string();
         assert!(error.contains("`joints` has the type <c8"), "{error}");
+    }
+
+    #[test]
+    fn arrays_in_fortrans_order_are_the_same_arrays() {
+        let joints = npy("<f4", "(1, 22, 3)", &floats((0..66).map(|n| n as f32)));
+        let turned = (0..3).flat_map(|axis| (0..22).map(move |joint| (joint * 3 + axis) as f32));
+        let mut fortran = npy("<f4", "(1, 22, 3)", &floats(turned));
+        let at = fortran.windows(5).position(|word| word == b"False").expect("an order");
+        fortran[at..at + 5].copy_from_slice(b"True ");
+        assert_eq!(read(&npz(&[("joints", fortran)])), read(&npz(&[("joints", joints)])));
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use super::posture::body_points;
 use super::recording::{Known, Source, Unit};
 use crate::silhouette::capsule::Point3;
+use std::collections::{HashMap, HashSet};
 
 const POINTS: usize = 4;
 /// Possible extents of a body with its props, mm; the file's unit is rejected beyond them.
@@ -10,6 +11,10 @@ const POSSIBLE_MM: [f64; 2] = [100.0, 20_000.0];
 /// Extents that are not checked further, mm.
 const USUAL_MM: [f64; 2] = [400.0, 6000.0];
 const ADULT_MM: f64 = 1700.0;
+/// Least size of a constant for missing points, file units.
+const LEAST_CONSTANT: f64 = 1.0;
+/// Three equal numbers of this size, file units, are never a place.
+const FAR: f64 = 9999.0;
 
 /// Hides and counts points at the origin. A root stays in frames with a person: it is there in all of them, and inside the
 /// body in most.
@@ -33,6 +38,47 @@ pub fn hide_zeros(frames: &mut [Vec<Option<Point3>>]) -> usize {
                 hidden += 1;
             }
         }
+    }
+    hidden
+}
+
+/// Hides and counts constants that programs write for missing points: three numbers of one size (-1, -9999.99, 9999999)
+/// that recur exactly, at several points or at a point that is elsewhere in other frames. Returns the first one, too.
+pub fn hide_constants(frames: &mut [Vec<Option<Point3>>]) -> Option<(usize, Point3)> {
+    let constant = |point: &Option<Point3>| -> Option<[u64; 3]> {
+        let place = (*point)?;
+        let size = place[0].abs();
+        let is_constant = size >= LEAST_CONSTANT && place.iter().all(|value| value.abs() == size);
+        is_constant.then(|| place.map(f64::to_bits))
+    };
+    let all: &[Vec<Option<Point3>>] = frames;
+    let points = || all.iter().flat_map(|frame| frame.iter().enumerate());
+    let mut markers_at: HashMap<[u64; 3], Vec<usize>> = HashMap::new();
+    for (marker, point) in points() {
+        if let Some(place) = constant(point) {
+            markers_at.entry(place).or_default().push(marker);
+        }
+    }
+    if markers_at.is_empty() {
+        return None;
+    }
+    let elsewhere: HashSet<usize> = points()
+        .filter(|(_, point)| point.is_some() && constant(point).is_none())
+        .map(|(marker, _)| marker)
+        .collect();
+    let is_missing = |place: &[u64; 3]| {
+        let far = f64::from_bits(place[0]).abs() >= FAR;
+        markers_at.get(place).is_some_and(|markers| {
+            let first = markers[0];
+            let shared = markers.iter().any(|marker| *marker != first);
+            far || (markers.len() > 1 && (shared || elsewhere.contains(&first)))
+        })
+    };
+    let mut hidden: Option<(usize, Point3)> = None;
+    for point in frames.iter_mut().flatten() {
+        let Some(place) = constant(point).filter(is_missing) else { continue };
+        hidden.get_or_insert((0, place.map(f64::from_bits))).0 += 1;
+        *point = None;
     }
     hidden
 }
@@ -156,6 +202,26 @@ mod tests {
         assert_eq!(found.frames[0][3], None);
         let hidden = "1 points at exactly 0, 0, 0 are treated as missing markers".to_owned();
         assert!(found.remarks().contains(&hidden), "{:?}", found.remarks());
+    }
+
+    #[test]
+    fn constants_for_missing_markers_are_hidden_and_reported() {
+        let row =
+            |[x, y, z]: [f64; 3]| [500.0, 900.0, 1700.0, 500.0, 900.0, 900.0, 450.0, 900.0, 100.0, x, y, z];
+        for (constant, shown) in
+            [(-1.0, "-1"), (-999.0, "-999"), (-9999.99, "-9999.99"), (9_999_999.0, "9999999")]
+        {
+            let rows = [row([700.0, 900.0, 800.0]), row([constant; 3]), row([constant; 3])];
+            let found = read(csv(&rows).as_bytes(), "csv", Choices::default()).expect("a table");
+            let seen: Vec<bool> = found.frames.iter().map(|frame| frame[3].is_some()).collect();
+            assert_eq!(seen, [true, false, false], "{constant}");
+            let remark = format!("2 points at {shown}, {shown}, {shown} are treated as missing markers");
+            assert!(found.remarks().contains(&remark), "{:?}", found.remarks());
+        }
+        // A marker that stays.
+        let still = csv(&[row([500.0; 3]); 2]);
+        let found = read(still.as_bytes(), "csv", Choices::default()).expect("a table");
+        assert_eq!(found.frames[1][3], Some([500.0; 3]));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //! and SGI. Analogue samples and model outputs are skipped; a negative residual means hidden.
 
 use super::reader::Reader;
-use super::recording::{Found, Known, RecordingError, Source, Unit, Up};
+use super::recording::{Found, Known, RecordingError, Source, Up};
 use crate::silhouette::{anatomy::without_prefix, capsule::Point3};
 use std::collections::{HashMap, HashSet};
 
@@ -100,10 +100,7 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         names,
         rate_hz: if layout.rate_hz.is_finite() { layout.rate_hz } else { 0.0 },
         frames,
-        unit: match unit.as_str() {
-            "" => Known { value: Unit::MM, source: Source::Format },
-            stated => Found::stated_unit(stated),
-        },
+        unit: Found::stated_unit(&unit),
         up,
         remarks,
     })
@@ -228,23 +225,25 @@ impl Layout {
     }
 }
 
-/// Parameters `TRIAL:ACTUAL_START_FIELD` to `ACTUAL_END_FIELD` (two words, low first) and `POINT:FRAMES`.
+/// Parameters `TRIAL:ACTUAL_START_FIELD` to `ACTUAL_END_FIELD` and `POINT:FRAMES`: a real number, or one or two words,
+/// low first.
 fn declared_frames(file: &File, parameters: &HashMap<String, Parameter>) -> Vec<usize> {
     let word = |at: usize| file.word(at, "a parameter").ok().map(usize::from);
     let field = |name: &str| -> Option<usize> {
-        let parameter = parameters.get(name).filter(|p| p.element == 2)?;
-        let high = if parameter.dimensions.first() == Some(&2) { word(parameter.at + 2)? } else { 0 };
-        Some(word(parameter.at)? + 65_536 * high)
+        let parameter = parameters.get(name)?;
+        match parameter.element {
+            2 => {
+                let high = if parameter.dimensions.first() == Some(&2) { word(parameter.at + 2)? } else { 0 };
+                Some(word(parameter.at)? + 65_536 * high)
+            }
+            4 => file.real(parameter.at, "a parameter").ok().map(|value| value as usize),
+            _ => None,
+        }
     };
     let trial = field("TRIAL:ACTUAL_END_FIELD")
         .zip(field("TRIAL:ACTUAL_START_FIELD"))
-        .and_then(|(last, first)| last.checked_sub(first).map(|frames| frames + 1));
-    let points = match parameters.get("POINT:FRAMES") {
-        Some(p) if p.element == 4 => file.real(p.at, "a parameter").ok().map(|value| value as usize),
-        Some(_) => field("POINT:FRAMES"),
-        None => None,
-    };
-    trial.into_iter().chain(points).collect()
+        .and_then(|(last, first)| last.checked_sub(first).map(|frames| frames.saturating_add(1)));
+    trial.into_iter().chain(field("POINT:FRAMES")).collect()
 }
 
 /// Parameters by `GROUP:NAME`; stops at damage, because points need no names.
@@ -290,6 +289,9 @@ fn text_rows(file: &File, parameter: Option<&Parameter>) -> Vec<String> {
         .dimensions
         .get(1..)
         .map_or(1, |rest| rest.iter().fold(1_usize, |product, &d| product.saturating_mul(d)));
+    if parameter.dimensions.contains(&0) {
+        return Vec::new();
+    }
     let text = file.bytes.get(parameter.at..).unwrap_or(&[]);
     text.chunks_exact(width).take(rows).map(|row| String::from_utf8_lossy(row).trim().to_owned()).collect()
 }

@@ -11,6 +11,8 @@ use crate::silhouette::{
 
 /// Body markers of a person.
 const LEAST: usize = 4;
+/// A person who moves less than another by this factor is still: noise of a millimetre, and metres.
+const STILL: f64 = 500.0;
 /// People whose names a remark lists.
 const SHOWN: usize = 10;
 
@@ -64,6 +66,23 @@ struct Group<'a> {
     places: Vec<usize>,
     body: HashSet<&'a str>,
     visible: usize,
+    /// Largest movement of a point of the body, file units.
+    moved: f64,
+}
+
+/// Median distance of a point from its median place, along the axis with most of it. A few wrong frames do not count.
+fn movement(frames: &[Vec<Option<Point3>>], place: usize) -> f64 {
+    let median = |mut values: Vec<f64>| {
+        values.sort_by(f64::total_cmp);
+        values.get(values.len() / 2).copied().unwrap_or_default()
+    };
+    let along = |axis: usize| {
+        let values =
+            || frames.iter().filter_map(move |frame| Some(frame.get(place).copied().flatten()?[axis]));
+        let middle = median(values().collect());
+        median(values().map(|value| (value - middle).abs()).collect())
+    };
+    (0..3).map(along).fold(0.0, f64::max)
 }
 
 /// Fails with the number of people.
@@ -74,7 +93,13 @@ fn by_prefix(found: Found, all: &[String], index: Option<usize>) -> Result<Found
         let prefix = anatomy::prefix(name);
         match groups.iter_mut().find(|group| group.prefix == prefix) {
             Some(group) => group.places.push(place),
-            None => groups.push(Group { prefix, places: vec![place], body: HashSet::new(), visible: 0 }),
+            None => groups.push(Group {
+                prefix,
+                places: vec![place],
+                body: HashSet::new(),
+                visible: 0,
+                moved: 0.0,
+            }),
         }
     }
     if groups.len() < 2 {
@@ -87,6 +112,7 @@ fn by_prefix(found: Found, all: &[String], index: Option<usize>) -> Result<Found
             body.iter().filter(|place| frame.get(**place).is_some_and(Option::is_some)).count()
         };
         group.visible = found.frames.iter().map(seen).sum();
+        group.moved = body.iter().map(|place| movement(&found.frames, *place)).fold(0.0, f64::max);
         group.body = body.iter().map(|place| anatomy::without_prefix(&all[*place])).collect();
     }
     let shares = |a: usize| {
@@ -98,7 +124,9 @@ fn by_prefix(found: Found, all: &[String], index: Option<usize>) -> Result<Found
     if people.len() < 2 {
         return alone(found);
     }
-    // In the file's order, those who are rarely visible last.
+    // In the file's order, dummies and static copies, then those who are rarely visible last.
+    let farthest = people.iter().map(|group| groups[*group].moved).fold(0.0, f64::max);
+    people.sort_by_key(|group| STILL * groups[*group].moved < farthest);
     let most = people.iter().map(|group| groups[*group].visible).max().unwrap_or(0);
     people.sort_by_key(|group| 2 * groups[*group].visible < most);
     let listed: Vec<String> = (1..)
@@ -182,6 +210,19 @@ mod tests {
         });
         let hidden = hidden.collect::<Vec<String>>().join("\n");
         assert_eq!(person(&hidden, None).expect("a table").by_name(0)["LASI"][0], 3500.0);
+    }
+
+    #[test]
+    fn a_person_who_never_moves_is_not_the_default() {
+        let table = two();
+        let moving = table.lines().enumerate().map(|(row, text)| {
+            // The suit of Ben walks 300 mm a frame.
+            if row == 0 { text.to_owned() } else { text.replace("3500,", &format!("{},", 3500 + 300 * row)) }
+        });
+        let moving = moving.collect::<Vec<String>>().join("\n");
+        let found = person(&moving, None).expect("a table");
+        assert_eq!(found.by_name(0)["LASI"][0], 3800.0);
+        assert!(found.remarks().iter().any(|remark| remark.contains("2 people: 1 Ben, 2 Ann")));
     }
 
     #[test]

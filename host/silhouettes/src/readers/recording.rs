@@ -213,20 +213,26 @@ pub struct Found {
 }
 
 impl Found {
-    /// The caller has to name a unit that is not known.
+    /// The caller has to name a unit that is not known. Without one, lengths are millimetres.
     pub(super) fn stated_unit(stated: &str) -> Known<Unit> {
+        if stated.is_empty() {
+            return Known { value: Unit::MM, source: Source::Format };
+        }
         match Unit::named(stated) {
             Ok(value) => Known { value, source: Source::File },
             Err(_) => Known { value: Unit::MM, source: Source::Unknown { stated: stated.to_owned() } },
         }
     }
 
-    /// Converts to millimetres, z up. Hides non-finite points and 0, 0, 0 (missing in many exports).
+    /// Converts to millimetres, z up. Hides non-finite points, 0, 0, 0 and other constants for missing points.
     pub fn settled(self, choices: Choices) -> Recording {
         let (mut names, mut frames, mut remarks) = (self.names, self.frames, self.remarks);
         let hidden = body::hide_zeros(&mut frames);
         if hidden > 0 {
             remarks.push(format!("{hidden} points at exactly 0, 0, 0 are treated as missing markers"));
+        }
+        if let Some((count, [x, y, z])) = body::hide_constants(&mut frames) {
+            remarks.push(format!("{count} points at {x}, {y}, {z} are treated as missing markers"));
         }
         let repeated = repeated(&names);
         if !repeated.is_empty() {

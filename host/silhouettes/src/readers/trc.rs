@@ -42,7 +42,8 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         (keys, values) = (filled_keys, filled_values);
     }
     let value = |key: &str| {
-        let found = keys.iter().position(|k| *k == key).and_then(|index| values.get(index).copied());
+        let place = keys.iter().position(|k| k.eq_ignore_ascii_case(key));
+        let found = place.and_then(|index| values.get(index).copied());
         found.ok_or_else(|| RecordingError::Line { line: 3, reason: format!("no value of {key}") })
     };
     let stated = |key: &str| {
@@ -52,7 +53,7 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
             reason: format!("{key} = `{text}` is not a number"),
         })
     };
-    let unit = Found::stated_unit(value("Units")?);
+    let unit = Found::stated_unit(value("Units").unwrap_or_default());
     let (rate_hz, count) = (stated("DataRate")?, stated("NumMarkers")?);
     // A name is above the first of its three columns; Cortex omits names of unidentified trajectories.
     let cells: Vec<&str> = cells(3)?.into_iter().skip(2).collect();
@@ -100,7 +101,8 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let frames = rows(&lines, &places, separator)?;
     // Without the number all frames are read.
     if let Ok(promised) = stated("NumFrames") {
-        let first = lines.iter().skip(5).find_map(|row| number(row.split(separator).next()?.trim()));
+        let mut rows = lines.iter().skip(first_row(&lines, separator));
+        let first = rows.find_map(|row| number(row.split(separator).next()?.trim()));
         match promised_frames("NumFrames", promised, frames.len()) {
             Ok(remark) => remarks.extend(remark),
             Err(_) if first.is_some_and(|first| first > 1.0) => remarks.push(format!(
@@ -124,10 +126,17 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     Ok(Found { names, rate_hz, frames, others: Vec::new(), planar, unit, up, remarks })
 }
 
+/// Lines before the frames: the fifth has the axes (X1, Y1, Z1), but some programs omit it and the blank one after it.
+fn first_row(lines: &[&str], separator: char) -> usize {
+    let number_of = |row: &&str| number(row.split(separator).next()?.trim());
+    4 + usize::from(lines.get(4).and_then(number_of).is_none())
+}
+
 /// Points with values in the longest row.
 fn columns(lines: &[&str], separator: char) -> usize {
     let is_blank = |c: char| c.is_whitespace() || c == separator;
-    let cells = lines.iter().skip(5).map(|row| row.trim_end_matches(is_blank).split(separator).count());
+    let rows = lines.iter().skip(first_row(lines, separator));
+    let cells = rows.map(|row| row.trim_end_matches(is_blank).split(separator).count());
     cells.max().unwrap_or(0).saturating_sub(2).div_ceil(3)
 }
 
@@ -139,7 +148,7 @@ fn rows(
 ) -> Result<Vec<Vec<Option<Point3>>>, RecordingError> {
     let width = places.iter().map(|place| 5 + 3 * place).max().unwrap_or(0);
     let (mut frames, mut all) = (Vec::new(), Vec::new());
-    for (index, row) in lines.iter().enumerate().skip(5) {
+    for (index, row) in lines.iter().enumerate().skip(first_row(lines, separator)) {
         // Trailing tabs are common; a blank row separates header and data.
         let cells: Vec<&str> = row.trim_end_matches([separator, '\r']).split(separator).collect();
         if row.trim_matches(|c: char| c.is_whitespace() || c == separator).is_empty() {
@@ -159,7 +168,9 @@ fn rows(
 }
 
 pub(super) fn is_hidden(cell: &str) -> bool {
-    cell.is_empty() || ["nan", "na", "n/a", "null", "-"].iter().any(|word| cell.eq_ignore_ascii_case(word))
+    const WORDS: [&str; 10] = ["nan", "na", "n/a", "#n/a", "null", "none", "-", ".", "?", "missing"];
+    // As C libraries of Windows print it.
+    cell.is_empty() || cell.contains(".#") || WORDS.iter().any(|word| cell.eq_ignore_ascii_case(word))
 }
 
 /// Three cells; an empty or invalid one is a hidden marker.
@@ -192,5 +203,15 @@ mod tests {
             let found = read(file(depth).as_bytes()).expect("a TRC file");
             assert_eq!((found.planar, found.frames.len()), (planar, 2), "{depth}");
         }
+    }
+
+    #[test]
+    fn a_header_without_a_unit_and_a_line_of_axes_is_read() {
+        let file = "PathFileType\t4\t(X/Y/Z)\ta.trc\ndatarate\tnummarkers\n30\t2\nFrame#\tTime\tHead\t\t\tLHeel\n\
+                    1\t0.0\t0\t1700\t9\t0\t1\t5\n2\t0.03\t0\t1700\t9\tNone\t-1.#IND\t.\n";
+        let found = read(file.as_bytes()).expect("a TRC file");
+        assert_eq!((found.frames.len(), found.unit.value.mm), (2, 1.0));
+        assert_eq!(found.frames[0][1].zip(found.frames[1][0]), Some(([0.0, 1.0, 5.0], [0.0, 1700.0, 9.0])));
+        assert_eq!(found.frames[1][1], None);
     }
 }

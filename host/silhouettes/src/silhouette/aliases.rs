@@ -10,8 +10,9 @@ use std::collections::BTreeMap;
 use super::{anatomy::without_prefix, template::Template};
 use namings::{NAMINGS, Naming};
 
-/// Text before the names of one body's points: of Mixamo, 3ds Max, Motive, VRoid and Character Creator.
-const PREFIXES: [&str; 7] = ["mixamorig", "bip001", "bip01", "skeleton", "jbipc", "jbip", "ccbase"];
+/// Text before the names of one body's points: of Mixamo, 3ds Max, Motive, Blender, VRoid, Character Creator and Rigify.
+const PREFIXES: [&str; 9] =
+    ["mixamorig", "bip001", "bip01", "skeleton", "armature", "jbipc", "jbip", "ccbase", "def"];
 /// Text after them: of OpenCap.
 const SUFFIXES: [&str; 1] = ["study"];
 /// Fewer names are not those of a body.

@@ -15,6 +15,8 @@ struct Made {
     header: (u16, u16),
     /// `TRIAL:ACTUAL_START_FIELD` and `ACTUAL_END_FIELD`.
     trial: Option<(u32, u32)>,
+    /// Whether the trial's parameters are real numbers, not two words.
+    is_trial_real: bool,
     /// `POINT:FRAMES` as a real number.
     point_frames: Option<f32>,
     units: &'static str,
@@ -28,6 +30,7 @@ impl Default for Made {
             frames: 10,
             header: (1, 10),
             trial: None,
+            is_trial_real: false,
             point_frames: None,
             units: "mm",
         }
@@ -76,7 +79,11 @@ impl Made {
         parameter(&mut section, "UNITS", 1, -1, &[self.units.len() as u8], self.units.as_bytes());
         if let Some((first, last)) = self.trial {
             for (name, value) in [("ACTUAL_START_FIELD", first), ("ACTUAL_END_FIELD", last)] {
-                parameter(&mut section, name, 2, 2, &[2], &value.to_le_bytes());
+                if self.is_trial_real {
+                    parameter(&mut section, name, 2, 4, &[], &(value as f32).to_le_bytes());
+                } else {
+                    parameter(&mut section, name, 2, 2, &[2], &value.to_le_bytes());
+                }
             }
         }
         if let Some(frames) = self.point_frames {
@@ -121,6 +128,7 @@ fn recordings_beyond_the_sixteen_bits_of_the_header_are_read_whole() {
 fn a_trimmed_header_yields_to_the_parameters_and_what_is_left_over_is_reported() {
     let trimmed = Made { frames: 500, header: (1, 1), trial: Some((101, 600)), ..Made::default() };
     assert!(whole(&trimmed)[0].contains("the header counts 1 frames, 500"));
+    assert_eq!(whole(&Made { is_trial_real: true, ..trimmed }).len(), 1);
     let more = Made { frames: 500, header: (1, 100), ..Made::default() };
     let found = more.read(Choices::default()).expect("a recording");
     assert_eq!(found.frames.len(), 100);
@@ -135,6 +143,8 @@ fn the_callers_unit_overrides_an_unknown_one() {
     assert!(error.contains("yard"), "{error}");
     let choices = Choices { unit: Some(Unit { mm: 10.0 }), ..Choices::default() };
     assert_eq!(made.read(choices).expect("a recording").by_name(0)["HEAD"], [10.0, 5000.0, 17_000.0]);
+    let unstated = Made { units: "", ..Made::default() }.read(Choices::default()).expect("a recording");
+    assert_eq!((unstated.unit.value, &unstated.unit.source), (Unit::MM, &Source::Format));
     // Metres, cut to four characters.
     let metres = Made { units: "mete", ..Made::default() };
     assert_eq!(metres.read(Choices::default()).expect("a recording").unit.value.mm, 1000.0);

@@ -1,6 +1,9 @@
 //! Reads the masks of a view from a folder or a video.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::HashSet,
+    path::{Path, PathBuf},
+};
 
 use farnear_files::{
     masks::{
@@ -15,6 +18,7 @@ use farnear_silhouettes::mask::{
     extractor::{Extractor, ExtractorSettings},
     subject::{Flag, SubjectChooser, SubjectSettings},
 };
+use ndarray::Axis;
 
 use crate::{error::Result, silhouettes::frame_of};
 
@@ -40,19 +44,48 @@ impl ViewKind {
         let mut first = Histogram::new(reading);
         match masks::grey(&files[0], reading) {
             Ok(picture) => first.add(&picture),
-            Err(MaskError::Coloured { .. }) => return Ok(Self::Video),
-            Err(error) => return Err(error.into()),
+            Err(error) => return Self::of_coloured(error, reading),
         }
         let are_masks = |seen: &Histogram| seen.levels().is_some() || seen.are_labels();
-        if !are_masks(&first) {
-            return Ok(Self::Video);
-        }
-        match Histogram::of(&files) {
-            Ok(all) => Ok(if are_masks(&all) { Self::Masks } else { Self::Video }),
-            Err(MaskError::Coloured { .. }) => Ok(Self::Video),
-            Err(error) => Err(error.into()),
+        let all = if are_masks(&first) { Histogram::of(&files) } else { Ok(first) };
+        match all {
+            Ok(all) if are_masks(&all) || are_mattes(&files, reading)? => Ok(Self::Masks),
+            Ok(_) => Ok(Self::Video),
+            Err(error) => Self::of_coloured(error, reading),
         }
     }
+
+    /// One colour on black is a mask, which its reader refuses with the colour.
+    fn of_coloured(error: MaskError, reading: masks::Reading) -> Result<Self> {
+        let MaskError::Coloured { path, .. } = &error else { return Err(error.into()) };
+        let Pixels::Rgb(picture) = pictures::read(path, reading)? else { return Ok(Self::Video) };
+        let mut colours: HashSet<[u8; 3]> = HashSet::new();
+        let are_few = picture.lanes(Axis(2)).into_iter().all(|pixel| {
+            colours.insert([pixel[0], pixel[1], pixel[2]]);
+            colours.len() <= 2
+        });
+        let is_mask = are_few && colours.len() == 2 && colours.contains(&[0; 3]);
+        Ok(if is_mask { Self::Masks } else { Self::Video })
+    }
+}
+
+/// Whether nearly all pixels of the first, middle and last picture are black or white, as of masks with soft edges.
+fn are_mattes(files: &[PathBuf], reading: masks::Reading) -> Result<bool> {
+    let mut any_white = false;
+    for index in [0, files.len() / 2, files.len().saturating_sub(1)] {
+        let picture = match masks::grey(&files[index], reading) {
+            Ok(picture) => picture,
+            Err(MaskError::Coloured { .. }) => return Ok(false),
+            Err(error) => return Err(error.into()),
+        };
+        let count = |wanted: u8| picture.iter().filter(|level| **level == wanted).count();
+        let white = count(u8::MAX);
+        if 4 * (count(0) + white) < 3 * picture.len() {
+            return Ok(false);
+        }
+        any_white |= white > 0;
+    }
+    Ok(any_white)
 }
 
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -277,6 +310,35 @@ mod tests {
                 areas.push(seen.mask.iter().filter(|set| **set).count());
             }
             assert_eq!(areas, [0, 1600, 1600], "{levels:?}");
+        }
+    }
+
+    #[test]
+    fn soft_edges_and_one_colour_on_black_are_those_of_masks() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let soft = Array2::from_shape_fn((120, 90), |(row, column)| match (row, column) {
+            (20..100, 30..50) => 255,
+            (20..100, 26..30 | 50..54) => (50 + 13 * column % 150) as u8,
+            _ => 0,
+        });
+        let path = folder.path().join("soft.png");
+        std::fs::write(&path, encoded(&soft, |level| *level).expect("a picture")).expect("written");
+        assert_eq!(ViewKind::guess(&path).expect("a kind"), ViewKind::Masks);
+        for (number, (floor, kind)) in
+            [([0, 0, 0], ViewKind::Masks), ([0, 0, 9], ViewKind::Video)].into_iter().enumerate()
+        {
+            let path = folder.path().join(format!("{number}.png"));
+            let colour = |x: u32, y: u32| match (x, y) {
+                (30..50, 20..100) => [128, 0, 0],
+                (_, 110..) => floor,
+                _ => [0, 0, 0],
+            };
+            image::RgbImage::from_fn(90, 120, |x, y| image::Rgb(colour(x, y))).save(&path).expect("written");
+            assert_eq!(ViewKind::guess(&path).expect("a kind"), kind);
+            if kind == ViewKind::Masks {
+                let refused = Frames::open(&View { path, kind }).err().map(|error| error.to_string());
+                assert!(refused.as_ref().is_some_and(|error| error.contains("[128, 0, 0]")), "{refused:?}");
+            }
         }
     }
 

@@ -89,7 +89,7 @@ impl Place {
         }
         let _lock = self.lock(&aside)?;
         let clearing = Unfinished::new(aside.clone());
-        clear(&aside).map_err(unwritable)?;
+        clear(&aside).map_err(|source| self.not_locked(source))?;
         let made = aside.join(name);
         let found = make(&made)?;
         let earlier = Provenance::read(&self.record());
@@ -141,16 +141,26 @@ impl Place {
 
     /// Locks the temporary folder for this process, so that two runs of a job do not mix.
     fn lock(&self, aside: &Path) -> Result<File, BatchError> {
-        let unwritable = |source| BatchError::Write { path: self.target.clone(), source };
         match fs::create_dir(aside) {
-            Err(error) if error.kind() != io::ErrorKind::AlreadyExists => return Err(unwritable(error)),
+            Err(error) if error.kind() != io::ErrorKind::AlreadyExists => {
+                return Err(BatchError::Write { path: self.target.clone(), source: error });
+            }
             _ => {}
         }
-        let lock = lockable(aside, File::open(aside)).map_err(unwritable)?;
+        let lock = lockable(aside, File::open(aside)).map_err(|source| self.not_locked(source))?;
         match lock.try_lock() {
             Err(fs::TryLockError::WouldBlock) => Err(BatchError::InUse { path: self.target.clone() }),
             // Continue on systems that cannot lock folders.
             Ok(()) | Err(fs::TryLockError::Error(_)) => Ok(lock),
+        }
+    }
+
+    /// A temporary folder that disappears is removed by another run, which has just ended.
+    fn not_locked(&self, source: io::Error) -> BatchError {
+        let path = self.target.clone();
+        match source.kind() {
+            io::ErrorKind::NotFound => BatchError::InUse { path },
+            _ => BatchError::Write { path, source },
         }
     }
 

@@ -31,11 +31,7 @@ impl Unit {
 
     /// In a sentence: depths in millimetres, in numbers of images.
     pub(super) fn words(self) -> &'static str {
-        match self {
-            Self::Mm => "mm",
-            Self::Um => "um",
-            Self::Image => "numbers of images",
-        }
+        if self == Self::Image { "numbers of images" } else { self.suffix() }
     }
 
     /// Suffix of lengths along the axis: `mean_mm`, `mean_um`, `mean_images`.

@@ -50,6 +50,17 @@ fn refuses_a_picture_that_arrived_before_its_exposure() {
 }
 
 #[test]
+fn a_slow_camera_is_watched_for_longer_than_it_takes_for_a_picture() {
+    let mut pairing = Pairing::default();
+    pairing.begin();
+    // Reported after 18 and 38 ms; each picture takes a second.
+    for (number, strobe_us, arrived_ms) in [(1, 1_000_000, 1_018), (2, 1_020_000, 2_018)] {
+        arrive(&mut pairing, long_shot(number, strobe_us), arrived_ms).unwrap();
+        assert_eq!(pairing.quiet_time(), Duration::from_millis(1_500));
+    }
+}
+
+#[test]
 fn a_missing_picture_without_a_count_is_found_by_the_delay_of_the_later_ones() {
     // Exposures 100 ms apart, pictures 12 to 20 ms after them.
     let delays_ms = [15, 12, 20, 14];
@@ -156,14 +167,23 @@ fn refuses_an_older_picture_after_a_newer_one() {
     assert!(judge(at(9, "IMG_0007.jpg"), at(9, "IMG_0006.jpg")).is_err());
     assert!(judge(at(9, "IMG_9999.jpg"), at(9, "IMG_0001.jpg")).is_ok());
     assert!(judge(at(9, "IMG_0001.jpg"), at(9, "IMG_9999.jpg")).is_err());
+    // Transferred in another order than exposed, with the transfers' times, also within one second of EXIF.
+    assert!(judge(at(8, "IMG_0007.jpg"), at(9, "IMG_0006.jpg")).is_err());
+    assert!(judge(at(8, "IMG_9999.jpg"), at(9, "IMG_0001.jpg")).is_ok());
+    let exposed = |evidence| Evidence { exposed: Some("2026:11:25 20:00:00.".into()), ..evidence };
+    assert!(judge(exposed(at(8, "IMG_0007.jpg")), exposed(at(9, "IMG_0006.jpg"))).is_err());
 }
 
 #[test]
-fn only_counters_of_four_digits_wrap_and_only_over_half_of_their_range() {
+fn counters_of_four_digits_wrap_and_only_over_half_of_their_range() {
     let order = |a: &str, b: &str| by_number(Path::new(a), Path::new(b));
     assert_eq!(order("IMG_0001.jpg", "IMG_5001.jpg"), Some(Ordering::Less));
     assert_eq!(order("IMG_0001.jpg", "IMG_5002.jpg"), Some(Ordering::Greater));
-    assert_eq!(order("IMG_00001.jpg", "IMG_09999.jpg"), Some(Ordering::Less));
+    assert_eq!(order("DSC00001.jpg", "DSC09999.jpg"), Some(Ordering::Greater));
+    assert_eq!(order("P1010001.jpg", "P1019999.jpg"), Some(Ordering::Greater));
+    assert_eq!(order("DSC00001.jpg", "DSC10000.jpg"), Some(Ordering::Less));
+    assert_eq!(order("20261125_200001.jpg", "20261125_201000.jpg"), Some(Ordering::Less));
+    assert_eq!(order("1764561600001.jpg", "1764561609000.jpg"), Some(Ordering::Less));
     assert_eq!(order("IMG_10000.jpg", "IMG_4000.jpg"), Some(Ordering::Greater));
     assert_eq!(order("IMG_4000.jpg", "IMG_10000.jpg"), Some(Ordering::Less));
     assert_eq!(order("IMG_0001.jpg", "DSC_0002.jpg"), None);

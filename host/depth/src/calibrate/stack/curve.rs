@@ -5,9 +5,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::astigmatism::FocusByDirection;
 use super::response::Sample;
 use crate::median::median;
-use crate::optics::{Coarser, RESPONSE_POINTS, Stage};
+use crate::optics::{Astigmatism, Coarser, RESPONSE_POINTS, Stage};
 
 /// Extent of the response beyond the learned depths, in normalised depth.
 const BEYOND: f64 = 0.05;
@@ -21,8 +22,8 @@ const SLOPES: [f64; 2] = [1.0 / 3.0, 3.0];
 const MIXTURES: usize = 50;
 /// Points at which the polynomial is inverted.
 const POINTS: usize = 200;
-/// Degree of coarseness over measured depth: of both sides of focus, the more blurred is coarser.
-const COARSENESS_DEGREE: usize = 2;
+/// Degree of coarseness and anisotropy over measured depth: of both sides of focus, the more blurred is coarser.
+const TEXTURE_DEGREE: usize = 2;
 /// Least difference of two textures' coarseness.
 const LEAST_APART: f64 = 0.1;
 /// Width of a class of true depths, for [`Curve::largest_degree`].
@@ -119,16 +120,31 @@ pub(super) fn by_texture<'a>(
 ) -> Option<Coarser> {
     let of = |original: bool| samples.clone().filter(move |s| s.original == original);
     let coarse = Curve::fit(of(false), degree, Some(curve.measured))?;
-    let [low, high] = curve.measured;
-    let table = |original: bool| {
-        let points = of(original).map(|s| [s.measured, s.coarseness]).filter(|[_, y]| y.is_finite());
-        let c = polynomial(points, COARSENESS_DEGREE)?;
-        let at = |i: usize| low + (high - low) * i as f64 / (RESPONSE_POINTS - 1) as f64;
-        Some(std::array::from_fn(|i| value(&c, at(i))))
-    };
-    let [of_target, coarseness]: [[f64; RESPONSE_POINTS]; 2] = [table(true)?, table(false)?];
+    let table = |original: bool| table(of(original).map(|s| [s.measured, s.coarseness]), curve);
+    let [of_target, coarseness] = [table(true)?, table(false)?];
     let apart = of_target.iter().zip(&coarseness).all(|(fine, coarse)| coarse - fine > LEAST_APART);
     apart.then_some(Coarser { response: coarse.response, of_target, coarseness })
+}
+
+/// What a focus that depends on direction adds to depth. Blur that is not round gives round texture a direction, which
+/// the response contains.
+pub(super) fn by_direction<'a>(
+    samples: impl Iterator<Item = &'a Sample> + Clone,
+    curve: &Curve,
+    focus: FocusByDirection,
+) -> Option<Astigmatism> {
+    let table =
+        |component: usize| table(samples.clone().map(move |s| [s.measured, s.anisotropy[component]]), curve);
+    let FocusByDirection { shift, spread } = focus;
+    Some(Astigmatism { shift, spread, of_target: [table(0)?, table(1)?] })
+}
+
+/// Values of texture `[measured depth, value]` at the response's measured depths.
+fn table(texture: impl Iterator<Item = [f64; 2]> + Clone, curve: &Curve) -> Option<[f64; RESPONSE_POINTS]> {
+    let c = polynomial(texture.filter(|[_, value]| value.is_finite()), TEXTURE_DEGREE)?;
+    let [low, high] = curve.measured;
+    let at = |i: usize| low + (high - low) * i as f64 / (RESPONSE_POINTS - 1) as f64;
+    Some(std::array::from_fn(|i| value(&c, at(i))))
 }
 
 /// Coefficients of the polynomial through points `[x, y]`, by least squares with Huber's weights.

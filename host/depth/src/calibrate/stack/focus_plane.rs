@@ -62,14 +62,35 @@ impl FocusPlane {
 
     /// Finds the plane. Fails if too few blocks have a peak inside the stack, and when `proceed` returns false.
     pub fn of(slices: &[Array2<f32>], proceed: &(dyn Fn() -> bool + Sync)) -> Result<Self, StackError> {
+        Self::of_detail(slices, slices.to_vec(), &BLURS, proceed)
+    }
+
+    /// As [`of`](Self::of), of the differences of pixels `apart` (down, right): mostly of texture that changes in this
+    /// direction.
+    pub(super) fn along(
+        slices: &[Array2<f32>],
+        apart: [isize; 2],
+        proceed: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Self, StackError> {
+        let differences = slices.par_iter().map(|slice| difference(slice, apart)).collect();
+        Self::of_detail(slices, differences, &BLURS[..2], proceed)
+    }
+
+    /// Of the `detail` of slices, on the scales of `blurs`.
+    fn of_detail(
+        slices: &[Array2<f32>],
+        detail: Vec<Array2<f32>>,
+        blurs: &[usize],
+        proceed: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Self, StackError> {
         let (height, width) = slices[0].dim();
         let side = (height.min(width) / BLOCKS).clamp(12, 64);
         let brightness = brightness(slices, side);
-        let mut smooth: Vec<Array2<f32>> = slices.to_vec();
+        let mut smooth = detail;
         let mut best: Option<(f64, Self)> = None;
         let (mut most, mut of_most) = (0, 0);
         let mut passes = 0;
-        for blurs in BLURS {
+        for &blurs in blurs {
             while passes < blurs {
                 let slices = smooth.par_iter().map(|slice| proceed().then(|| blurred(slice)));
                 smooth = slices.collect::<Option<_>>().ok_or(StackError::Stopped)?;
@@ -191,6 +212,15 @@ pub(super) fn blurred(image: &Array2<f32>) -> Array2<f32> {
         })
     };
     pass(&pass(image, 1, 0), 0, 1)
+}
+
+/// Each pixel's difference to the one `apart` (down, right) from it.
+fn difference(image: &Array2<f32>, [down, right]: [isize; 2]) -> Array2<f32> {
+    let (height, width) = image.dim();
+    Array2::from_shape_fn((height, width), |(y, x)| {
+        let other = (reflect(y as isize + down, height), reflect(x as isize + right, width));
+        image[other] - image[(y, x)]
+    })
 }
 
 /// Mean of the blocks of each slice, relative to its mean over the slices and within [`VIGNETTING`]; 1 without light.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::ENOUGH_DEPTHS;
-use super::curve::{Curve, by_texture};
+use super::curve::{Curve, by_direction, by_texture};
 use super::response::{LEARNED, Sample, Samples, WORTH};
 use crate::median::{deviation, median};
 use crate::optics::{Optics, Stage, unexplained};
@@ -110,7 +110,8 @@ pub(super) fn judge(
         let degree = degree.min(Curve::largest_degree(others()));
         let curve = Curve::fit(others(), degree, None)?;
         let coarser = if textures { Some(by_texture(all(), degree, &curve)?) } else { None };
-        let stage = curve.stage(coarser);
+        let astigmatism = samples.by_direction.and_then(|focus| by_direction(others(), &curve, focus));
+        let stage = Stage { astigmatism, ..curve.stage(coarser) };
         let [low, high] =
             others().fold([f64::MAX, f64::MIN], |[low, high], s| [low.min(s.truth), high.max(s.truth)]);
         for s in own.into_iter().filter(|s| (low..=high).contains(&s.truth)) {
@@ -124,9 +125,10 @@ pub(super) fn judge(
 
 fn tested(stage: &Stage, s: &Sample) -> Option<Judged> {
     let [found, slope, of_texture] = stage.respond(s.measured, s.coarseness)?;
-    let noise = (s.noise * slope).hypot(of_texture);
+    let [shift, of_direction] = stage.shift(s.measured, s.anisotropy);
+    let noise = (s.noise * slope).hypot(of_texture).hypot(of_direction);
     Some(Judged {
-        error: found - s.truth,
+        error: found - shift - s.truth,
         truth: s.truth,
         original: s.original,
         noise,
@@ -154,7 +156,8 @@ pub(super) fn finish(
         robust(judged.iter().filter(|j| j.original == original).map(|j| j.error))
     };
     let (plain, inside) = judge(samples, degree, Split::Parts, false)?;
-    let curve = Curve::fit(samples.of.iter().filter(|s| s.original), degree, None)?;
+    let originals = || samples.of.iter().filter(|s| s.original);
+    let curve = Curve::fit(originals(), degree, None)?;
     // Few pairs do not determine the difference of two responses; the deviation has to cover it.
     let enough = samples.pairs >= ENOUGH_DEPTHS;
     let coarser = if enough { by_texture(samples.of.iter(), degree, &curve) } else { None };
@@ -205,6 +208,7 @@ pub(super) fn finish(
         usual_unexplained: usual(high),
         coarseness: usual_coarseness(samples),
         coarser,
+        astigmatism: samples.by_direction.and_then(|focus| by_direction(originals(), &curve, focus)),
         ..*identity
     };
     let [within, scatter] = honesty(true, high);

@@ -9,12 +9,14 @@ use serde::{Deserialize, Serialize};
 use ndarray::Array2;
 
 use super::StackError;
+use super::astigmatism::FocusByDirection;
 use super::curve::Curve;
 use super::focus_plane::{FocusPlane, blurred};
 use super::foreign;
 use super::held_out::{HeldOut, Judged, Split, finish, judge, robust};
 use crate::adaptive_window::{Bank, LEARNED_PX, Window};
 use crate::coarseness::coarseness;
+use crate::direction::anisotropy;
 use crate::measure::{DepthMethod, MeasureSettings, measure};
 use crate::median::median;
 use crate::optics::{Optics, Stage};
@@ -85,6 +87,7 @@ pub(super) struct Sample {
     /// Mean square residual relative to the noise.
     pub misfit: f32,
     pub coarseness: f64,
+    pub anisotropy: [f64; 2],
     /// Colour of its block on a checkerboard.
     pub even: bool,
     /// Half of the field.
@@ -105,6 +108,7 @@ impl Sample {
             noise: 0.0,
             misfit: 1.0,
             coarseness: 0.0,
+            anisotropy: [0.0; 2],
             even: false,
             left: false,
             original: true,
@@ -117,12 +121,33 @@ pub(super) struct Samples {
     pub of: Vec<Sample>,
     pub looked_at: usize,
     pub pairs: usize,
+    pub by_direction: Option<FocusByDirection>,
+}
+
+impl Samples {
+    /// Leaves out an astigmatism that does not make held-out parts more accurate.
+    fn confirmed(mut self, degree: usize) -> Self {
+        let error = |samples: &Self| {
+            let (judged, _) = judge(samples, degree, Split::Parts, false)?;
+            Some(robust(judged.iter().filter(|j| j.original).map(|j| j.error)))
+        };
+        let with = error(&self);
+        let by_direction = self.by_direction.take();
+        let without = error(&self);
+        if let (Some(with), Some(without)) = (with, without)
+            && with <= without
+        {
+            self.by_direction = by_direction;
+        }
+        self
+    }
 }
 
 struct Pair {
     far: usize,
     prepared: Prepared,
     coarseness: Array2<f32>,
+    anisotropy: [Array2<f32>; 2],
     original: bool,
 }
 
@@ -137,6 +162,8 @@ pub(super) struct Learned {
 pub(super) struct Target<'a> {
     pub slices: &'a [Array2<f32>],
     pub plane: &'a FocusPlane,
+    /// In normalised depth.
+    pub by_direction: Option<FocusByDirection>,
     pub pair_step: usize,
     pub bin: usize,
     pub coding: f64,
@@ -248,6 +275,7 @@ pub(super) fn learn(target: &Target<'_>) -> Result<Learned, StackError> {
     trials.sort_by(|a, b| a.robust_mm.total_cmp(&b.robust_mm));
     let unfit = StackError::NoPair(target.pair_step);
     let Some(Best { degree, optics, samples, .. }) = best else { return Err(unfit) };
+    let samples = samples.confirmed(degree);
     let foreign = foreign::find(&samples.of, degree, target.pair_step, target.slices.len());
     let Some((stage, held_out)) = finish(&samples, degree, &optics, half_mm) else { return Err(unfit) };
     Ok(Learned { optics: optics.with_stage(stage), held_out, trials, foreign })
@@ -310,8 +338,13 @@ impl Target<'_> {
                 let [far_image, near_image] = [&prepared.far, &prepared.near].map(blurred);
                 let noise = prepared.noise.scaled(SMOOTHED_NOISE);
                 let coarse = Prepared { far: far_image, near: near_image, noise, ..prepared.clone() };
-                let pair =
-                    |prepared, original| Pair { far, coarseness: coarseness(&prepared), prepared, original };
+                let pair = |prepared, original| Pair {
+                    far,
+                    coarseness: coarseness(&prepared),
+                    anisotropy: anisotropy(&prepared),
+                    prepared,
+                    original,
+                };
                 Some([pair(prepared, true), pair(coarse, false)])
             })
             .flatten_iter()
@@ -343,7 +376,8 @@ impl Target<'_> {
         if of.len() < 200 {
             return Err(StackError::NoPair(self.pair_step));
         }
-        Ok(Samples { of, looked_at, pairs: pairs.iter().filter(|pair| pair.original).count() })
+        let pairs = pairs.iter().filter(|pair| pair.original).count();
+        Ok(Samples { of, looked_at, pairs, by_direction: self.by_direction })
     }
 
     fn samples(&self, pair: &Pair, optics: &Optics, settings: &MeasureSettings) -> (Vec<Sample>, usize) {
@@ -374,6 +408,7 @@ impl Target<'_> {
                     noise,
                     misfit: estimate.misfit[(y, x)],
                     coarseness: f64::from(pair.coarseness[(y, x)]),
+                    anisotropy: pair.anisotropy.each_ref().map(|map| f64::from(map[(y, x)])),
                     even: (y / BLOCK_PX + x / BLOCK_PX).is_multiple_of(2),
                     left: 2 * x < width,
                     original: pair.original,

@@ -24,6 +24,41 @@ fn rejects_a_truncated_jpeg() {
 }
 
 #[test]
+fn a_progressive_jpeg_needs_the_scans_of_all_bits() {
+    let frame = [255, 0xc2, 0, 11, 8, 0, 8, 0, 8, 1, 1, 0x11, 0];
+    let scan = |first: u8, last: u8, bits: u8| [255, 0xda, 0, 8, 1, 1, 0, first, last, bits, 0x55];
+    let lacks = |scans: &[[u8; 11]]| {
+        complete::lacks_data(&[&[255, 0xd8], &frame[..], scans.as_flattened(), &[255, 0xd9]].concat())
+    };
+    let all = [scan(0, 0, 1), scan(1, 63, 2), scan(1, 63, 0x21), scan(0, 0, 0x10), scan(1, 63, 0x10)];
+    assert!(!lacks(&all));
+    for count in 0..all.len() {
+        assert!(lacks(&all[..count]), "{count}");
+    }
+}
+
+#[test]
+fn zeros_in_a_jpeg_are_a_hole_where_they_encode_coefficients() {
+    let whole = jpeg(64, 48);
+    assert!(!complete::lacks_data(&whole));
+    let mut hole = whole.clone();
+    let end = hole.len() - 2;
+    hole[end - 200..end - 100].fill(0);
+    assert!(complete::lacks_data(&hole) && refusal(&hole).contains("incomplete"));
+    let padded = |bytes: usize| [&whole[..end], &vec![0; bytes], &[0xff, 0xd9]].concat();
+    assert_eq!(decode_grey(&padded(100)).unwrap(), decode_grey(&whole).unwrap());
+    assert!(complete::lacks_data(&padded(5000)));
+    // In a table of a program, zeros may be the end of each block.
+    let with_first_code = |value: u8| {
+        let table = [&[255, 0xc4, 0, 20, 0x10, 0, 1][..], &[0; 14], &[value]].concat();
+        let scan = [255, 0xda, 0, 8, 1, 1, 0, 0, 63, 0];
+        [&[255, 0xd8], &table[..], &scan, &[0; 100], &[1, 255, 0xd9]].concat()
+    };
+    assert!(complete::lacks_data(&with_first_code(0x01)));
+    assert!(!complete::lacks_data(&with_first_code(0x00)));
+}
+
+#[test]
 fn rejects_truncated_files_of_every_format() {
     let grey = image::GrayImage::from_fn(40, 30, |x, y| image::Luma([(x * 5 + y) as u8]));
     let pixels = ndarray::Array2::from_shape_fn((30, 40), |(y, x)| (x * 5 + y) as u16);
@@ -102,6 +137,8 @@ fn rejects_raw_files_with_a_remedy() {
         b"FUJIFILMCCD-RAW 0201".to_vec(),
         b"\0\0\0\x18ftypcrx \0".to_vec(),
         b"IIU\0\x18".to_vec(),
+        b"\0MRM\0\x01".to_vec(),
+        b"II\x1a\0\0\0HEAPCCDR\x02\0".to_vec(),
     ] {
         let said = refusal(&raw);
         assert!(said.contains("raw file") && said.contains("develop"), "{said}");
@@ -271,6 +308,11 @@ fn rotates_a_jpeg_by_its_orientation() {
     assert_eq!(turned.dim(), (48, 32));
     assert_eq!(turned[(40, 10)], plain[(31 - 10, 40)]);
     assert_eq!(decode_grey(&jpeg_turned(48, 32, 1)).unwrap().pixels, plain);
+    // EXIF of more than 64 KB continues in another segment.
+    let file = jpeg_turned(48, 32, 6);
+    let end = 4 + usize::from(u16::from_be_bytes([file[4], file[5]]));
+    let continued = [&file[..end], b"\xff\xe1\0\x0cExif\0\0more", &file[end..]].concat();
+    assert_eq!(decode_grey(&continued).unwrap().pixels, turned);
 }
 
 #[test]

@@ -295,6 +295,24 @@ fn written_files_keep_the_white_level() {
 }
 
 #[test]
+fn deflate_data_end_in_their_checksum() {
+    let pixels: Vec<u8> = (0..100).map(|index| index + 1).collect();
+    let (mut sum, mut of_sums) = (1_u32, 0);
+    for value in &pixels {
+        sum += u32::from(*value);
+        of_sums += sum;
+    }
+    // A stored block (RFC 1950 and 1951).
+    let head = [0x78_u8, 1, 1, 100, 0, !100, 0xff];
+    let mut strip = [&head, &pixels[..], &((of_sums % 65_521) << 16 | sum).to_be_bytes()].concat();
+    let file = |strip: &[u8]| tiff(CLASSIC, &[Page::grey(10, 10, 8, strip.to_vec()).with(259, &[8])]);
+    assert_eq!(read(&file(&strip))[(9, 9)], 100.0);
+    let count = strip.len();
+    strip[count - 64..].fill(0);
+    assert!(decode_grey(&file(&strip)).unwrap_err().contains("incomplete"));
+}
+
+#[test]
 fn pixels_without_a_value_are_not_white() {
     assert_eq!([0.1, 0.25, 0.3].map(|value| relative(value, 0.25)), [0.4, 1.0, 1.0]);
     assert!(relative(f32::NAN, 0.25).is_nan());

@@ -13,6 +13,8 @@
 //! Keywords in any case; free white space and line breaks up to `MOTION`. Names extend to the end of their
 //! line, so they may hold blanks (`Bip01 L Foot`) and colons (`mixamorig:Hips`).
 
+use std::iter::Peekable;
+
 use super::super::recording::{self, RecordingError};
 use crate::silhouette::capsule::Point3;
 
@@ -66,10 +68,7 @@ pub fn parse(text: &str) -> Result<Motion, RecordingError> {
     let channels = joints.iter().map(|joint| joint.channels.len()).sum();
     let mut lines = Lines::after(&cursor);
     let most_points = POINTS_PER_BYTE.saturating_mul(text.len());
-    let (line, promised) = lines.value("Frames")?;
-    let promised: usize = promised
-        .parse()
-        .map_err(|_| wrong(line, format!("found `{}`, expected the number of frames", short(promised))))?;
+    let promised = if lines.is_next("Frame Time") { None } else { Some(lines.frame_count()?) };
     let (line, time) = lines.value("Frame Time")?;
     let frame_time_s = number(time, line, "the seconds from frame to frame")?;
     if frame_time_s <= 0.0 {
@@ -81,13 +80,16 @@ pub fn parse(text: &str) -> Result<Motion, RecordingError> {
     if cut {
         remarks.push("the last frame is cut short and left out".into());
     }
-    // Some programs count one frame too many.
-    if frames.len() + 1 < promised {
-        let reason = format!("found the end of the file after {} frames, expected {promised}", frames.len());
-        return Err(wrong(last, reason));
-    }
-    if frames.len() != promised {
-        remarks.push(format!("{promised} frames are promised, the file has {}", frames.len()));
+    let found = frames.len();
+    match promised {
+        // Some programs count one frame too many.
+        Some(promised) if found + 1 < promised => {
+            let reason = format!("found the end of the file after {found} frames, expected {promised}");
+            return Err(wrong(last, reason));
+        }
+        Some(promised) if found == promised => {}
+        Some(promised) => remarks.push(format!("{promised} frames are promised, the file has {found}")),
+        None => remarks.push(format!("the file does not state the number of frames: {found} are read")),
     }
     Ok(Motion { joints, frame_time_s, frames, remarks })
 }
@@ -266,7 +268,7 @@ impl<'a> Cursor<'a> {
 }
 
 struct Lines<'a> {
-    lines: Box<dyn Iterator<Item = (usize, &'a str)> + 'a>,
+    lines: Peekable<Box<dyn Iterator<Item = (usize, &'a str)> + 'a>>,
     last: usize,
 }
 
@@ -275,7 +277,20 @@ impl<'a> Lines<'a> {
         let (first, rest) = (cursor.line, cursor.rest);
         let lines = rest.lines().enumerate().map(move |(n, line)| (first + n, line.trim()));
         let last = first + rest.lines().count().saturating_sub(1);
-        Self { lines: Box::new(lines.filter(|(_, line)| !line.is_empty())), last }
+        let filled: Box<dyn Iterator<Item = (usize, &'a str)> + 'a> =
+            Box::new(lines.filter(|(_, line)| !line.is_empty()));
+        Self { lines: filled.peekable(), last }
+    }
+
+    fn is_next(&mut self, key: &str) -> bool {
+        self.lines.peek().is_some_and(|(_, text)| value_of(text, key).is_some())
+    }
+
+    fn frame_count(&mut self) -> Result<usize, RecordingError> {
+        let (line, count) = self.value("Frames")?;
+        count
+            .parse()
+            .map_err(|_| wrong(line, format!("found `{}`, expected the number of frames", short(count))))
     }
 
     /// Line `key: value`, with optional blanks around the colon.
@@ -283,10 +298,7 @@ impl<'a> Lines<'a> {
         let Some((line, text)) = self.lines.next() else {
             return Err(wrong(self.last, format!("found the end of the file, expected `{key}:`")));
         };
-        let is_key =
-            |found: &str| found.split_whitespace().collect::<Vec<_>>().join(" ").eq_ignore_ascii_case(key);
-        let value = text.split_once(':').filter(|(found, _)| is_key(found));
-        let value = value.map(|(_, value)| (line, value.trim()));
+        let value = value_of(text, key).map(|value| (line, value));
         value.ok_or_else(|| wrong(line, format!("found `{}`, expected `{key}:`", short(text))))
     }
 
@@ -322,6 +334,13 @@ impl<'a> Lines<'a> {
         }
         Ok((frames, false))
     }
+}
+
+/// The value of a line `key: value`.
+fn value_of<'a>(text: &'a str, key: &str) -> Option<&'a str> {
+    let (found, value) = text.split_once(':')?;
+    let found = found.split_whitespace().collect::<Vec<_>>().join(" ");
+    found.eq_ignore_ascii_case(key).then(|| value.trim())
 }
 
 /// Words of a line; numbers without a blank between them are several (`0.0-7.5`, as SlimeVR wrote).
@@ -421,6 +440,7 @@ mod tests {
         for (frames, left, phrases) in [
             ("Frames: 1", 2, vec!["1 frames are promised, the file has 2"]),
             ("Frames: 3", 2, vec!["3 frames are promised, the file has 2"]),
+            ("", 2, vec!["the file does not state the number of frames: 2 are read"]),
         ] {
             let motion = parse(&SMALL.replace("Frames: 2", frames)).expect("a BVH file");
             assert_eq!(

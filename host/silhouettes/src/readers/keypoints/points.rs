@@ -25,6 +25,8 @@ pub const POINTS: [&str; 12] = [
     "poseWorldLandmarks",
     "worldLandmarks",
 ];
+/// Beyond all pictures, pixels.
+const FAR: f64 = 9999.0;
 /// Points of less confidence are missing.
 pub const LEAST_CONFIDENCE: f64 = 0.1;
 
@@ -50,10 +52,11 @@ impl Raw {
         self.sure.or(self.third.filter(|_| !has_depth && !layout.has_picture_depth()))
     }
 
+    /// Two equal numbers outside every picture, or 0, are a missing point.
     pub fn in_picture(&self) -> Option<Point3> {
-        let zero = self.x == 0.0 && self.y == 0.0;
+        let missing = self.x == self.y && (self.x == 0.0 || self.x <= -1.0 || self.x >= FAR);
         // Not 0, 0, 0, which is a missing marker.
-        (!zero && self.x.is_finite() && self.y.is_finite()).then_some([self.x, self.y, 1e-9])
+        (!missing && self.x.is_finite() && self.y.is_finite()).then_some([self.x, self.y, 1e-9])
     }
 }
 
@@ -245,6 +248,15 @@ pub fn is_frame(map: &Map<String, Value>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn constants_outside_every_picture_are_missing_points() {
+        let seen = |x: f64, y: f64| Raw { x, y, ..Raw::MISSING }.in_picture().is_some();
+        for constant in [0.0, -1.0, -9999.99, 9_999_999.0, f64::NAN] {
+            assert!(!seen(constant, constant), "{constant}");
+        }
+        assert!(seen(120.0, 120.0) && seen(-1.0, 200.0) && seen(-0.4, -0.4));
+    }
 
     #[test]
     fn scores_far_below_a_full_confidence_are_those_of_heat_maps() {

@@ -8,7 +8,7 @@ pub struct Naming {
     pub names: &'static [(&'static str, &'static str)],
 }
 
-pub const NAMINGS: [Naming; 9] = [
+pub const NAMINGS: [Naming; 10] = [
     Naming {
         about: "joints named as Biovision and SMPL do",
         template: "bvh",
@@ -162,9 +162,9 @@ pub const NAMINGS: [Naming; 9] = [
         about: "joints named as the Kinect SDK does",
         template: "kinect",
         names: &[
-            ("hip centre", "hipcenter spinebase"),
-            ("spine", "spine spinemid"),
-            ("shoulder centre", "shouldercenter spineshoulder"),
+            ("hip centre", "hipcenter spinebase pelvis"),
+            ("spine", "spine spinemid spinenavel"),
+            ("shoulder centre", "shouldercenter spineshoulder spinechest"),
             ("neck", "neck"),
             ("head", "head"),
             ("# shoulder", "shoulder@"),
@@ -180,6 +180,34 @@ pub const NAMINGS: [Naming; 9] = [
         ],
     },
     Naming {
+        about: "markers named as OptiTrack's baseline and Qualisys' sport sets do",
+        template: "plug-in-gait",
+        names: &[
+            ("LFHD", "headl headtop"),
+            ("RFHD", "headr headside"),
+            ("LBHD", "headfront"),
+            ("C7", "spinetop backtop tv2"),
+            ("CLAV", "chest"),
+            ("T10", "backl backleft"),
+            ("RBAC", "backr backright"),
+            ("&SHO", "@shouldertop"),
+            ("&UPA", "@uarmhigh @arm"),
+            ("&ELB", "@elbowout"),
+            ("&WRA", "@wristin"),
+            ("&WRB", "@wristout"),
+            ("&FIN", "@handout"),
+            ("&ASI", "waist@front"),
+            ("&PSI", "waist@back"),
+            ("&THI", "@thigh @thighfrontlow"),
+            ("&KNE", "@kneeout"),
+            ("&TIB", "@shin @shinfronthigh"),
+            ("&ANK", "@ankleout"),
+            ("&HEE", "@heel @heelback"),
+            ("&MT5", "@toeout @forefoot5"),
+            ("&TOE", "@toetip @toein @forefoot2"),
+        ],
+    },
+    Naming {
         about: "laboratory markers named as OpenCap's augmenter does",
         template: "opencap",
         names: &[
@@ -191,3 +219,44 @@ pub const NAMINGS: [Naming; 9] = [
         ],
     },
 ];
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn points_of_further_systems_are_matched() {
+        for (names, template, count) in [
+            (
+                "Ann:HeadTop Ann:HeadFront Ann:HeadSide Ann:BackTop Ann:Chest Ann:BackLeft Ann:BackRight \
+                 Ann:WaistLFront Ann:WaistRFront Ann:WaistLBack Ann:WaistRBack Ann:LShoulderBack \
+                 Ann:LShoulderTop Ann:LElbowOut Ann:LUArmHigh Ann:LHandOut Ann:LWristOut Ann:LWristIn \
+                 Ann:LKneeOut Ann:LThigh Ann:LAnkleOut Ann:LShin Ann:LToeOut Ann:LToeIn Ann:LHeel \
+                 Ann:RShoulderBack Ann:RShoulderTop Ann:RElbowOut Ann:RUArmHigh Ann:RHandOut Ann:RWristOut \
+                 Ann:RWristIn Ann:RKneeOut Ann:RThigh Ann:RAnkleOut Ann:RShin Ann:RToeOut Ann:RToeIn \
+                 Ann:RHeel",
+                "plug-in-gait",
+                37,
+            ),
+            (
+                "PELVIS SPINE_NAVEL SPINE_CHEST NECK CLAVICLE_LEFT SHOULDER_LEFT ELBOW_LEFT WRIST_LEFT \
+                 HAND_LEFT HANDTIP_LEFT THUMB_LEFT CLAVICLE_RIGHT SHOULDER_RIGHT ELBOW_RIGHT WRIST_RIGHT \
+                 HAND_RIGHT HANDTIP_RIGHT THUMB_RIGHT HIP_LEFT KNEE_LEFT ANKLE_LEFT FOOT_LEFT HIP_RIGHT \
+                 KNEE_RIGHT ANKLE_RIGHT FOOT_RIGHT HEAD NOSE EYE_LEFT EAR_LEFT EYE_RIGHT EAR_RIGHT",
+                "kinect",
+                25,
+            ),
+            (
+                "Armature|Hips Armature|Spine Armature|Neck Armature|Head Armature|LeftArm \
+                 Armature|LeftForeArm Armature|LeftHand Armature|RightArm Armature|RightForeArm \
+                 Armature|RightHand Armature|LeftUpLeg Armature|LeftLeg Armature|LeftFoot Armature|RightUpLeg \
+                 Armature|RightLeg Armature|RightFoot",
+                "bvh",
+                16,
+            ),
+        ] {
+            let names: Vec<String> = names.split_whitespace().map(str::to_owned).collect();
+            let found = super::super::find(&names).unwrap_or_else(|| panic!("no template for {names:?}"));
+            assert!(found.remark.ends_with(&format!("of the template `{template}`")), "{}", found.remark);
+            assert!(found.names.len() >= count, "{} of {count}: {names:?}", found.names.len());
+        }
+    }
+}
