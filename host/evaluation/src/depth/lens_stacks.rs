@@ -100,7 +100,7 @@ pub fn measure(page: &mut Page, data: &Path) -> Result<()> {
         "The response is learned by classical calibration (measured depth as a polynomial of the stage's), so that it has no plateaus at the few depths of the pairs. Windows are up to 41 binned px. \
          The error that remains is the same in all pairs of a place: texture and relief of the plate, which only larger windows average. The lens was chosen on the left half. \
          The right half was measured once to find the cause of the errors and after each of three changes. With windows of up to 31 px, the ratios were 0.69, 0.82, 0.74 and 0.77, \
-         and 41 px were chosen after that measurement, so these figures are not blind to the right half. The later choice of windows and noise was made on rendered scenes; these figures were read after each change. The factor of the tolerance between windows was chosen on both halves. A response by texture \
+         and 41 px were chosen after that measurement, so these figures are not blind to the right half. The later choice of windows and noise was made on rendered scenes; these figures were read after each change. The weights of the frequencies that give the texture's direction were chosen with the plate in view. The factor of the tolerance between windows was chosen on both halves. A response by texture \
          brought the errors of the first two rows to 1.33 and 1.36 SD there; lenses with fewer than four pairs have had none since. The peer's windows are 15 px: part of the gain is their size.",
     );
     Ok(())
