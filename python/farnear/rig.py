@@ -302,7 +302,8 @@ def _program(event: Any) -> tuple[Any, Any, Any]:
 def _check_start(sequence: Any, start: Optional[float] = None) -> None:
     """Refuse a relative plan without the position that it is relative to: `useq` takes 0."""
     plan = getattr(sequence, "z_plan", None)
-    positions = tuple(getattr(sequence, "stage_positions", ()))
+    # Without `p` in the order `useq` ignores the positions.
+    positions = tuple(getattr(sequence, "stage_positions", ())) if "p" in getattr(sequence, "axis_order", "p") else ()
     starts = [start if position.z is None else position.z for position in positions]
     # A position's own plan replaces that of the sequence.
     own = [getattr(position.sequence, "z_plan", None) is not None for position in positions]
@@ -319,8 +320,10 @@ SUPPORTED = {
 """Fields of a `useq` event that are done, or that need nothing to be done."""
 
 
-def _is_asked(value: Any) -> bool:
-    return value is not None and value is not False and not (isinstance(value, (list, tuple)) and not value)
+def _is_asked(event: Any, field: str) -> bool:
+    value = getattr(event, field)
+    is_empty = value is None or value is False or (isinstance(value, (list, tuple)) and not value)
+    return not is_empty and value != type(event).model_fields[field].get_default(call_default_factory=True)
 
 
 def _check(event: Any, axis: str, info: Mapping[str, Any], channels: Mapping[str, tuple[float, float]]) -> None:
@@ -333,7 +336,7 @@ def _check(event: Any, axis: str, info: Mapping[str, Any], channels: Mapping[str
     if event.channel is not None and event.channel.config not in channels:
         light = f"channels={{{event.channel.config!r}: (100, 0)}}"
         raise FarnearError(f"{name} asks for the channel {event.channel.config!r}; give its light in percent, as in {light}")
-    others = [what for what in type(event).model_fields if what not in SUPPORTED and _is_asked(getattr(event, what))]
+    others = [what for what in type(event).model_fields if what not in SUPPORTED and _is_asked(event, what)]
     if others:
         raise FarnearError(f"{name} asks for {', '.join(others)}; the rig has z, channels and time only")
     if event.z_pos is None:

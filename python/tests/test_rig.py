@@ -147,6 +147,8 @@ def test_a_relative_plan_needs_a_position(emulated_rig):
     for positions in [[], [{"z": 50}, {"name": "b"}], with_own]:
         with pytest.raises(farnear.FarnearError, match="relative to no position"):
             emulated_rig.run_sequence(useq.MDASequence(z_plan=plan, stage_positions=positions))
+    with pytest.raises(farnear.FarnearError, match="relative to no position"):
+        emulated_rig.run_sequence(useq.MDASequence(z_plan=plan, stage_positions=[{"z": 50}], axis_order="tcz"))
     taken = list(emulated_rig.run_sequence(useq.MDASequence(z_plan=plan, stage_positions=[{"z": 50}])))
     assert [exposure.record["asked_um"] for exposure in taken] == [40, 50, 60]
 

@@ -17,9 +17,9 @@ const NOISE: f32 = 20.0;
 pub(crate) fn anisotropy(pair: &Prepared) -> [Array2<f32>; 2] {
     let sum = &pair.far + &pair.near;
     let (height, width) = sum.dim();
-    let mean_of = |of: &(dyn Fn([f32; 4]) -> f32 + Sync)| {
-        let mut values = Array2::zeros((height, width));
-        Zip::indexed(&mut values).par_for_each(|(y, x), own| {
+    let [mut energy, mut along, mut diagonal] = [(); 3].map(|()| Array2::<f32>::zeros((height, width)));
+    Zip::indexed(&mut energy).and(&mut along).and(&mut diagonal).par_for_each(
+        |(y, x), energy, along, diagonal| {
             let second = |down: isize, right: isize| {
                 let at = |sign: isize| {
                     let y = reflect(y as isize + sign * down, height);
@@ -28,13 +28,17 @@ pub(crate) fn anisotropy(pair: &Prepared) -> [Array2<f32>; 2] {
                 at(-1) - 2.0 * sum[(y, x)] + at(1)
             };
             // Two pixels along the axes and one along the diagonals: both have the same response to a diagonal frequency.
-            let value = of([second(0, 2), second(2, 0), second(1, 1), second(-1, 1)]);
-            *own = if value.is_finite() { value } else { 0.0 };
-        });
-        box_mean(values.view(), LEARNED_PX[2])
-    };
+            let [across, down, falling, rising] = [second(0, 2), second(2, 0), second(1, 1), second(-1, 1)];
+            if (across + down + falling + rising).is_finite() {
+                *energy = (across + down).powi(2);
+                *along = across * across - down * down;
+                *diagonal = 4.0 * (falling * falling - rising * rising);
+            }
+        },
+    );
+    let [mut energy, along, diagonal] =
+        [energy, along, diagonal].map(|values| box_mean(values.view(), LEARNED_PX[2]));
     let noise = 2.0 * NOISE * pair.noise.mean_variance as f32;
-    let mut energy = mean_of(&|[across, down, ..]: [f32; 4]| (across + down).powi(2));
     energy.mapv_inplace(|energy| {
         let texture = energy - noise;
         if texture > TELLING * energy { texture } else { f32::NAN }
@@ -43,10 +47,7 @@ pub(crate) fn anisotropy(pair: &Prepared) -> [Array2<f32>; 2] {
         Zip::from(&mut difference).and(&energy).for_each(|difference, energy| *difference /= energy);
         difference
     };
-    [
-        relative(mean_of(&|[across, down, ..]: [f32; 4]| across * across - down * down)),
-        relative(mean_of(&|[.., falling, rising]: [f32; 4]| 4.0 * (falling * falling - rising * rising))),
-    ]
+    [along, diagonal].map(relative)
 }
 
 #[cfg(test)]

@@ -361,7 +361,8 @@ fn finish(
     let gain = report.balanced.map_or(1.0, |balanced| balanced.gain);
     let noise = settings.noise.or_else(|| blocks.noise(gain)).unwrap_or_default();
     let noise = if settings.coding > 0.0 {
-        noise.coded(settings.coding, brightness::mean(far.view()))
+        // Balancing amplifies the coding's error in a darker near image.
+        noise.coded(settings.coding * gain.min(1.0).powi(-2), brightness::mean(far.view()))
     } else {
         noise
     };

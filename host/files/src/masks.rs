@@ -45,10 +45,10 @@ pub enum MaskError {
     )]
     Labels { path: PathBuf, levels: Vec<u8> },
     #[error(
-        "{}: {percent} % of the masks' pixels are set: is the person black on white? Masks have the person white, on black",
+        "{}: {percent} % of the masks' pixels are set, and {of_border} % of their border: is the person black on white? Masks have the person white, on black",
         path.display()
     )]
-    Inverted { path: PathBuf, percent: u64 },
+    Inverted { path: PathBuf, percent: u64, of_border: u64 },
     #[error(
         "{}: the mask is {}x{}, but `{first}` is {}x{}; the masks of a sequence must be alike",
         path.display(), found.1, found.0, expected.1, expected.0

@@ -27,7 +27,7 @@ const DARKEST: f64 = 0.5;
 /// Largest distance of a dark frame's mean from the darkest one's, relative to the flat frames' mean: dark current may differ by some
 /// per cent, a frame with light by much more.
 const UNLIKE: f64 = 0.05;
-/// Part of the pixels with the largest value from which a flat frame tells nothing: that of noise is rare.
+/// Fraction of pixels with the largest value above which a flat frame is clipped or without noise.
 const CLIPPED: f64 = 0.5;
 /// Part of full scale below which light is weak: a step of 8 bits is then more than 4 % of it.
 const WEAK: f64 = 0.1;
@@ -95,8 +95,8 @@ pub fn calibrate(settings: &CalibrateCameraRequest, context: &Context<'_>) -> Re
         UNLIKE * flat.mean(),
         "one exposure and the lens covered; a flat frame belongs to --flat",
     )?;
-    let frames = CameraFrames::learn(&dark.images, &flat.images)?;
     flat.check_values()?;
+    let frames = CameraFrames::learn(&dark.images, &flat.images)?;
     doubts(&flat, &dark).iter().for_each(|doubt| context.progress.warn(doubt));
     let staged = Staging::into_folder(&settings.out)?;
     staged.write(DARK, &npy::write(frames.dark()))?;

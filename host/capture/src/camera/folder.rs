@@ -101,14 +101,17 @@ impl FolderCamera {
             match self.used.get_mut(&path) {
                 None => fresh.push((written, path)),
                 Some(used) if (used.written, used.bytes) == (written, bytes) => {}
-                // Some programs set the time of a complete file.
-                Some(used) if used.paired.is_some() && used.paired == hash_of(&path) => {
-                    used.written = written;
-                }
-                Some(used) if used.paired.is_some() || was_complete(used, written) => {
-                    return Err(CameraError::Overwritten { path });
-                }
-                Some(_) => {} // it was being written when the camera was armed
+                Some(used) => match (used.paired, hash_of(&path)) {
+                    // Another program holds it, or it was being written when the camera was armed.
+                    (Some(_), None) => {}
+                    (None, _) if !was_complete(used, written) => {}
+                    // Some programs set the time of a complete file.
+                    (Some(before), Some(now)) if before == now => {
+                        used.written = written;
+                        self.pairing.retimed(&path, written);
+                    }
+                    _ => return Err(CameraError::Overwritten { path }),
+                },
             }
         }
         for (at, (_, path)) in fresh.iter().enumerate() {

@@ -30,8 +30,10 @@ const REPORTED_MAX: usize = 256;
 const QUIET: Duration = Duration::from_millis(200);
 /// Two crystals differ by 50 ppm each, plus a margin.
 const DRIFT_PPM: u64 = 200;
-/// Cameras number their files from 1 to one less (DCF).
-const COUNTER: u64 = 10_000;
+/// Longest wait for a surplus picture because earlier ones came late.
+const QUIET_MAX: Duration = Duration::from_secs(5);
+/// Cameras number their files from 0001 to 9999 (DCF).
+const COUNTER_RANGE: u64 = 10_000;
 /// GigE Vision 1.x counts from 1 to this, skipping 0.
 const SHORT_COUNT_MAX: u64 = 65_535;
 
@@ -92,8 +94,8 @@ pub struct Pairing {
     /// Whether board time follows the local clock; an emulated board may run faster.
     in_real_time: bool,
     contents: Vec<(u64, u32)>,
-    /// Longest interval of two exposures, or one and a half times the longest wait for a picture without a stamp: a
-    /// surplus one may be as late.
+    /// Longest interval of two exposures, or one and a half times the longest wait for a picture without a stamp, at most
+    /// [`QUIET_MAX`]: a surplus one may be as late.
     longest: Duration,
     /// Arrival of the last picture.
     came: Option<Instant>,
@@ -152,6 +154,15 @@ impl Pairing {
 
     pub fn quiet_time(&self) -> Duration {
         self.longest.max(QUIET)
+    }
+
+    /// A program set the time of a file that was judged.
+    pub fn retimed(&mut self, path: &Path, written: SystemTime) {
+        if let Some((Evidence { taken: Some((at, of)), .. }, _)) = &mut self.last
+            && of == path
+        {
+            *at = written;
+        }
     }
 
     /// The frame that was ahead of the last exposure.
@@ -237,7 +248,7 @@ impl Pairing {
             _ => (shot.trigger.0.saturating_sub(u64::from(shot.settle.0)), shot.strobe_end.0),
         };
         let interval = Duration::from_micros(to.saturating_sub(from));
-        self.longest = self.longest.max(interval).max(waited * 3 / 2);
+        self.longest = self.longest.max(interval).max((waited * 3 / 2).min(QUIET_MAX));
         self.came = Some(came);
         self.last = Some((evidence, *shot));
         Ok(Belongs::Here)
@@ -362,11 +373,11 @@ pub fn by_number(a: &Path, b: &Path) -> Option<Ordering> {
     if name_a != name_b {
         return None;
     }
-    // Half of the counter exceeds any distance within a program. Longer numbers are times.
+    // Half of the counter exceeds any distance within a program. Numbers of six digits are times of day, longer ones times.
     let rolled_over = digits_a == digits_b
-        && (4..=7).contains(&digits_a)
-        && a / COUNTER == b / COUNTER
-        && a.abs_diff(b) > COUNTER / 2;
+        && matches!(digits_a, 4 | 5 | 7)
+        && a / COUNTER_RANGE == b / COUNTER_RANGE
+        && a.abs_diff(b) > COUNTER_RANGE / 2;
     Some(if rolled_over { b.cmp(&a) } else { a.cmp(&b) })
 }
 

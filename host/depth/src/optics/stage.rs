@@ -167,7 +167,7 @@ impl Stage {
         if let Some(Astigmatism { shift, spread, of_target }) = &self.astigmatism {
             let all = shift.iter().chain(of_target.as_flattened()).chain([spread]);
             if !all.clone().all(|v| v.is_finite() && v.abs() < 20.0) || *spread < 0.0 {
-                return Some("astigmatism must have finite values and a spread of 0 or more");
+                return Some("astigmatism must have values within -20 to 20 and a spread of 0 or more");
             }
         }
         if self.coarseness.is_some_and(|[fine, coarse]| !(fine.is_finite() && coarse >= fine)) {

@@ -3,7 +3,7 @@
 //! Both images pass the second difference along both axes (Immerkaer 1996), whose response peaks at the highest
 //! frequencies, towards (pi, pi). There defocus leaves little signal, proportional in both images. So the smaller
 //! eigenvalue of a block's covariance is the noise. Where both images have unlike noise, it is that of the more blurred
-//! one, as in the residual of the model. Blocks of several brightnesses separate shot noise from the constant part.
+//! one, as in the residual of the model, and the smaller one in blocks without detail. Blocks of several brightnesses separate shot noise from the constant part.
 //! Cost: twenty additions per pixel of the blocks.
 
 use ndarray::ArrayView2;

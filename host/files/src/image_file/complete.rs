@@ -163,7 +163,7 @@ pub(super) fn jpeg_exif(bytes: &[u8]) -> Option<&[u8]> {
     segments.find_map(|(marker, data, _)| data.strip_prefix(b"Exif\0\0").filter(|_| marker == 0xe1))
 }
 
-/// Whether a JPEG with its end lacks data before it. A progressive one was cut between two scans if some coefficients lack their last
+/// Whether a JPEG with its end lacks data before it. A progressive one was cut between two scans if some coefficients of its brightness lack their last
 /// bits (T.81, G.1.2); a copy may have left a part of a scan as zeros.
 pub(super) fn lacks_data(jpeg: &[u8]) -> bool {
     /// No picture has as many where zeros encode coefficients: each block would have all of them.
@@ -205,7 +205,7 @@ pub(super) fn lacks_data(jpeg: &[u8]) -> bool {
                 }
                 let of_zeros =
                     |[_, tables]: &[u8; 2]| zeros_are_coefficients[0x10 | usize::from(tables & 15)];
-                let encodes = last > 0 && bits >> 4 == 0 && selectors.iter().any(of_zeros);
+                let encodes = last == 63 && bits >> 4 == 0 && selectors.iter().any(of_zeros);
                 let mut zeros = after[..scan_length(after)].rsplit(|byte| *byte != 0).map(<[u8]>::len);
                 let at_end = zeros.next().unwrap_or(0);
                 if encodes && (at_end > PADDING || zeros.any(|zeros| zeros >= ZEROS)) {
@@ -215,7 +215,8 @@ pub(super) fn lacks_data(jpeg: &[u8]) -> bool {
             _ => {}
         }
     }
-    whole.iter().any(|(_, done)| done.contains(&false))
+    // Some programs leave colours coarse.
+    whole.first().is_some_and(|(_, done)| done.contains(&false))
 }
 
 /// Why a JPEG of this coding is not read (T.81, table B.1; JPEG-LS), from the marker and precision of its frame.

@@ -217,17 +217,21 @@ fn unsupported(page: &Directory) -> Option<String> {
     }
 }
 
-/// Whether deflate data end in zeros, as a cut copy does in a file that had its size before. They end in a checksum, which the decoder
-/// does not read.
+/// Whether deflate data and the file end in zeros, as a cut copy does in a file that had its size before. The data end in a checksum,
+/// which the decoder does not read.
 fn ends_in_zeros(file: &mut (impl Read + Seek), page: &Directory) -> io::Result<bool> {
-    let mut end = [0; 64];
+    const ZEROS: [u8; 64] = [0; 64];
     let [at, length] = page.last_strip;
-    let Some(before) = length.checked_sub(end.len() as u64) else { return Ok(false) };
-    let place = SeekFrom::Start(at.saturating_add(before));
-    // Some programs state too many bytes.
-    let is_there = file.seek(place).and_then(|_| file.read_exact(&mut end)).is_ok();
+    let Some(before) = length.checked_sub(ZEROS.len() as u64) else { return Ok(false) };
+    let mut is_zero = |place: SeekFrom| {
+        let mut found = ZEROS;
+        // Some programs state too many bytes.
+        file.seek(place).and_then(|_| file.read_exact(&mut found)).is_ok() && found == ZEROS
+    };
+    let are_zeros =
+        is_zero(SeekFrom::End(-(ZEROS.len() as i64))) && is_zero(SeekFrom::Start(at.saturating_add(before)));
     file.rewind()?;
-    Ok(is_there && end == [0; 64])
+    Ok(are_zeros)
 }
 
 /// A page of a file of this size, upright.

@@ -192,9 +192,9 @@ impl Levels {
 
     /// Refuses full frames whose background is set.
     pub fn check_people(&self, path: &Path) -> Result<(), MaskError> {
-        let percent = self.percent_set;
-        if percent >= MOST_PEOPLE || self.percent_of_border >= MOST_OF_BORDER {
-            return Err(MaskError::Inverted { path: path.into(), percent });
+        let (percent, of_border) = (self.percent_set, self.percent_of_border);
+        if percent >= MOST_PEOPLE || of_border >= MOST_OF_BORDER {
+            return Err(MaskError::Inverted { path: path.into(), percent, of_border });
         }
         Ok(())
     }

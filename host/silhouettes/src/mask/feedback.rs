@@ -92,13 +92,14 @@ impl Feedback {
         })
     }
 
-    /// Those of a followed frame's people who entered or walked; all if none of them did.
+    /// Those of a followed frame's people who entered or walked; all unless one of them is inside the picture.
     #[must_use]
     pub fn walkers(&self, people: Vec<Person>) -> Vec<Person> {
-        let walked = |person: &Person| {
+        let is_walker = |person: &Person| {
             self.tracks.iter().any(|track| track.is_person() && track.bounds == person.bounds)
         };
-        if people.iter().any(walked) { people.into_iter().filter(walked).collect() } else { people }
+        let is_inside = |person: &Person| is_walker(person) && !person.bounds.touches_edge(self.size);
+        if people.iter().any(is_inside) { people.into_iter().filter(is_walker).collect() } else { people }
     }
 
     /// Adds the people of a frame and returns the pixels of holes, if any; `background` is the empty scene for the
@@ -126,8 +127,9 @@ impl Feedback {
                 if step <= STANDING * height { track.still_frames.saturating_add(1) } else { 0 };
             let way = (middle.0 - track.origin.0).hypot(middle.1 - track.origin.1);
             let at_edge = person.bounds.touches_edge(self.size);
-            let hinged = hinged(track.first, person.bounds) && !at_edge;
-            // Another person moves the middle of a region, too, and one who came through a door was one region with it.
+            let entered = track.first.touches_edge(self.size);
+            let hinged = !at_edge && !entered && hinged(track.first, person.bounds);
+            // Another person moves the middle of a region, too. A door and the person in it are one region.
             track.walked |= (way >= WALKED * height && !hinged && track.hidden == 0) || at_edge;
             track.walked &= !(hinged && track.still_frames >= STOPPED_FRAMES);
             (track.bounds, track.middle, track.unseen_frames) = (person.bounds, middle, 0);
@@ -135,7 +137,8 @@ impl Feedback {
                 let mask = person.mask(self.size);
                 let empty = background();
                 if sharpness(&mask, Frame::Rgb(empty.view())) > HOLE * sharpness(&mask, frame) {
-                    (track.walked, track.hidden, track.origin) = (false, 0, middle);
+                    (track.walked, track.hidden) = (false, 0);
+                    (track.first, track.origin) = (person.bounds, middle);
                     paint(person, &mut holes);
                 }
             }
@@ -186,12 +189,13 @@ impl Feedback {
     }
 }
 
-/// Whether three sides are in place and the fourth is not: a door, a drawer or a curtain.
+/// Whether the left or the right side moved and all others are in place: a door, a drawer or a curtain.
 fn hinged(first: BoundingBox, now: BoundingBox) -> bool {
     let tolerance = (now.height() / IN_PLACE).max(2);
-    let sides = |bounds: BoundingBox| [bounds.top, bounds.bottom, bounds.left, bounds.right];
-    let in_place = sides(first).into_iter().zip(sides(now)).filter(|(a, b)| a.abs_diff(*b) <= tolerance);
-    in_place.count() == 3
+    let is_in_place = |a: usize, b: usize| a.abs_diff(b) <= tolerance;
+    is_in_place(first.top, now.top)
+        && is_in_place(first.bottom, now.bottom)
+        && is_in_place(first.left, now.left) != is_in_place(first.right, now.right)
 }
 
 fn shared(a: BoundingBox, b: BoundingBox) -> usize {
@@ -301,6 +305,21 @@ mod tests {
             );
         }
         assert!(feedback.held().is_none_or(|held| !held[[50, 60]]));
+    }
+
+    #[test]
+    fn who_entered_or_sits_down_is_a_person() {
+        let mut feedback = Feedback::new(SIZE);
+        for right in 1..15 {
+            follow(&mut feedback, &[(0, right)]);
+        }
+        for _ in 0..40 {
+            follow(&mut feedback, &[(3, 17)]);
+        }
+        assert!(feedback.held().is_some_and(|held| held[[50, 10]]));
+        let first = BoundingBox { top: 20, bottom: 80, left: 40, right: 60 };
+        assert!(!hinged(first, BoundingBox { top: 44, ..first }));
+        assert!(hinged(first, BoundingBox { right: 75, ..first }));
     }
 
     #[test]

@@ -16,17 +16,15 @@ pub const READER: Reader = Reader {
     read: |bytes, _| read(bytes),
 };
 
-const POSITIONS: [&str; 12] = [
+const POSITIONS: [&str; 10] = [
     "joints",
     "Jtr",
     "jtr",
     "joints3d",
     "joints3D",
     "joints_3d",
-    "pred_joints",
     "smpl_joints",
     "keypoints3d",
-    "kp3d",
     "joint_positions",
     "positions",
 ];
@@ -202,7 +200,8 @@ fn array(name: &str, bytes: &[u8]) -> Result<Array, RecordingError> {
     if !found.values.is_empty() && found.values.len() < expected {
         return Err(bad(&format!("{} of {expected} values are there: it was cut short", found.values.len())));
     }
-    if fortran && found.values.len() == expected {
+    if fortran && !found.values.is_empty() {
+        found.values.truncate(expected);
         found.values = in_c_order(&found.values, &found.shape);
     }
     Ok(found)

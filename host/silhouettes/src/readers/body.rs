@@ -42,13 +42,12 @@ pub fn hide_zeros(frames: &mut [Vec<Option<Point3>>]) -> usize {
     hidden
 }
 
-/// Hides and counts constants that programs write for missing points: three numbers of one size (-1, -9999.99, 9999999)
-/// that recur exactly, at several points or at a point that is elsewhere in other frames. Returns the first one, too.
+/// Hides and counts constants that programs write for missing points: three equal numbers (-1, -9999.99, 9999999) that
+/// recur exactly, at several points or, if negative, at a point that is elsewhere in other frames. Returns the first one, too.
 pub fn hide_constants(frames: &mut [Vec<Option<Point3>>]) -> Option<(usize, Point3)> {
     let constant = |point: &Option<Point3>| -> Option<[u64; 3]> {
         let place = (*point)?;
-        let size = place[0].abs();
-        let is_constant = size >= LEAST_CONSTANT && place.iter().all(|value| value.abs() == size);
+        let is_constant = place[0].abs() >= LEAST_CONSTANT && place.iter().all(|value| *value == place[0]);
         is_constant.then(|| place.map(f64::to_bits))
     };
     let all: &[Vec<Option<Point3>>] = frames;
@@ -67,11 +66,12 @@ pub fn hide_constants(frames: &mut [Vec<Option<Point3>>]) -> Option<(usize, Poin
         .map(|(marker, _)| marker)
         .collect();
     let is_missing = |place: &[u64; 3]| {
-        let far = f64::from_bits(place[0]).abs() >= FAR;
+        let value = f64::from_bits(place[0]);
         markers_at.get(place).is_some_and(|markers| {
             let first = markers[0];
             let shared = markers.iter().any(|marker| *marker != first);
-            far || (markers.len() > 1 && (shared || elsewhere.contains(&first)))
+            let returns = value < 0.0 && elsewhere.contains(&first);
+            value.abs() >= FAR || (markers.len() > 1 && (shared || returns))
         })
     };
     let mut hidden: Option<(usize, Point3)> = None;

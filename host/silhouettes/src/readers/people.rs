@@ -11,8 +11,8 @@ use crate::silhouette::{
 
 /// Body markers of a person.
 const LEAST: usize = 4;
-/// A person who moves less than another by this factor is still: noise of a millimetre, and metres.
-const STILL: f64 = 500.0;
+/// A person who moves less than another by this factor is a dummy: one who stands sways by more.
+const STILL: f64 = 5000.0;
 /// People whose names a remark lists.
 const SHOWN: usize = 10;
 
@@ -76,9 +76,9 @@ fn movement(frames: &[Vec<Option<Point3>>], place: usize) -> f64 {
         values.sort_by(f64::total_cmp);
         values.get(values.len() / 2).copied().unwrap_or_default()
     };
+    let seen = || frames.iter().filter_map(|frame| frame.get(place).copied().flatten());
     let along = |axis: usize| {
-        let values =
-            || frames.iter().filter_map(move |frame| Some(frame.get(place).copied().flatten()?[axis]));
+        let values = || seen().map(move |point| point[axis]).filter(|value| value.is_finite());
         let middle = median(values().collect());
         median(values().map(|value| (value - middle).abs()).collect())
     };

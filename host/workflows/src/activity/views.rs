@@ -69,7 +69,8 @@ impl ViewKind {
     }
 }
 
-/// Whether nearly all pixels of the first, middle and last picture are black or white, as of masks with soft edges.
+/// Whether most pixels of the first, middle and last picture are black or white, and fewer grey than white, as of masks with soft
+/// edges.
 fn are_mattes(files: &[PathBuf], reading: masks::Reading) -> Result<bool> {
     let mut any_white = false;
     for index in [0, files.len() / 2, files.len().saturating_sub(1)] {
@@ -80,7 +81,8 @@ fn are_mattes(files: &[PathBuf], reading: masks::Reading) -> Result<bool> {
         };
         let count = |wanted: u8| picture.iter().filter(|level| **level == wanted).count();
         let white = count(u8::MAX);
-        if 4 * (count(0) + white) < 3 * picture.len() {
+        let either = count(0) + white;
+        if 4 * either < 3 * picture.len() || (white > 0 && picture.len() - either > white) {
             return Ok(false);
         }
         any_white |= white > 0;

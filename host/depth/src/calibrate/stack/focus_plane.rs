@@ -76,11 +76,11 @@ impl FocusPlane {
         Self::of_detail(slices, differences, &BLURS[..2], proceed)
     }
 
-    /// Of the `detail` of slices, on the scales of `blurs`.
+    /// Of the `detail` of slices, after the numbers of blurs in `scales`.
     fn of_detail(
         slices: &[Array2<f32>],
         detail: Vec<Array2<f32>>,
-        blurs: &[usize],
+        scales: &[usize],
         proceed: &(dyn Fn() -> bool + Sync),
     ) -> Result<Self, StackError> {
         let (height, width) = slices[0].dim();
@@ -90,7 +90,7 @@ impl FocusPlane {
         let mut best: Option<(f64, Self)> = None;
         let (mut most, mut of_most) = (0, 0);
         let mut passes = 0;
-        for &blurs in blurs {
+        for &blurs in scales {
             while passes < blurs {
                 let slices = smooth.par_iter().map(|slice| proceed().then(|| blurred(slice)));
                 smooth = slices.collect::<Option<_>>().ok_or(StackError::Stopped)?;

@@ -147,7 +147,8 @@ struct Pair {
     far: usize,
     prepared: Prepared,
     coarseness: Array2<f32>,
-    anisotropy: [Array2<f32>; 2],
+    /// Where the lens has astigmatism.
+    anisotropy: Option<[Array2<f32>; 2]>,
     original: bool,
 }
 
@@ -341,7 +342,7 @@ impl Target<'_> {
                 let pair = |prepared, original| Pair {
                     far,
                     coarseness: coarseness(&prepared),
-                    anisotropy: anisotropy(&prepared),
+                    anisotropy: self.by_direction.map(|_| anisotropy(&prepared)),
                     prepared,
                     original,
                 };
@@ -408,7 +409,10 @@ impl Target<'_> {
                     noise,
                     misfit: estimate.misfit[(y, x)],
                     coarseness: f64::from(pair.coarseness[(y, x)]),
-                    anisotropy: pair.anisotropy.each_ref().map(|map| f64::from(map[(y, x)])),
+                    anisotropy: pair
+                        .anisotropy
+                        .as_ref()
+                        .map_or([f64::NAN; 2], |of| of.each_ref().map(|map| f64::from(map[(y, x)]))),
                     even: (y / BLOCK_PX + x / BLOCK_PX).is_multiple_of(2),
                     left: 2 * x < width,
                     original: pair.original,

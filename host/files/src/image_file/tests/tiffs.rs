@@ -307,9 +307,13 @@ fn deflate_data_end_in_their_checksum() {
     let mut strip = [&head, &pixels[..], &((of_sums % 65_521) << 16 | sum).to_be_bytes()].concat();
     let file = |strip: &[u8]| tiff(CLASSIC, &[Page::grey(10, 10, 8, strip.to_vec()).with(259, &[8])]);
     assert_eq!(read(&file(&strip))[(9, 9)], 100.0);
+    // Padding that the directory follows.
+    let padded = [&strip[..], &[0; 64]].concat();
+    assert_eq!(read(&file(&padded))[(9, 9)], 100.0);
     let count = strip.len();
     strip[count - 64..].fill(0);
-    assert!(decode_grey(&file(&strip)).unwrap_err().contains("incomplete"));
+    let cut = [file(&strip), vec![0; 64]].concat();
+    assert!(decode_grey(&cut).unwrap_err().contains("incomplete"));
 }
 
 #[test]

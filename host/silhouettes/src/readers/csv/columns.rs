@@ -109,7 +109,8 @@ pub fn frames(columns: &StringRecord, rows: &[StringRecord], has_people: bool) -
     Some(times.iter().map(|time| known.partition_point(|other| other < time).to_string()).collect())
 }
 
-/// Frames per second by a column of times and the mean of its usual steps, to three decimals.
+/// Frames per second by a column of times, to three decimals: by all steps if the times are even but for rounding, else by the
+/// usual ones.
 pub fn rate_hz(columns: &StringRecord, rows: &[StringRecord]) -> Option<f64> {
     let column = place(columns, &TIMES)?;
     let times: Vec<f64> = rows.iter().filter_map(|row| number(row.get(column)?)).collect();
@@ -118,15 +119,24 @@ pub fn rate_hz(columns: &StringRecord, rows: &[StringRecord]) -> Option<f64> {
     let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
     steps.sort_unstable_by(f64::total_cmp);
     let step = steps.get(steps.len() / 2).copied()?;
-    // Rounded times have steps of two lengths, one unit of the last digit apart; a step over missing frames is longer.
     let decimals = rows
         .iter()
         .filter_map(|row| row.get(column)?.split_once(['.', ',']))
         .map(|(_, after)| after.trim().len());
     let unit = 0.1_f64.powi(decimals.max().unwrap_or(0) as i32);
-    let longest = (step + 1.5 * unit).max(1.5 * step);
-    let usual = &steps[..steps.partition_point(|other| *other < longest)];
-    let mean = usual.iter().sum::<f64>() / usual.len() as f64;
+    let mean_of = |steps: &[f64]| steps.iter().sum::<f64>() / steps.len() as f64;
+    let of_all = mean_of(&steps);
+    let mut frames = times;
+    frames.dedup();
+    // Errors of rounding do not add up, those of missing frames do.
+    let is_even = frames
+        .iter()
+        .enumerate()
+        .all(|(frame, time)| (time - frames[0] - frame as f64 * of_all).abs() < 1.1 * unit);
+    let usual = steps.partition_point(|other| *other < 1.5 * step);
+    // A rate between those of two rounded steps has many of both.
+    let are_rounded = is_even && 10 * (steps.len() - usual) >= steps.len();
+    let mean = if are_rounded { of_all } else { mean_of(&steps[..usual]) };
     let name = simple(columns.get(column)?);
     let unit = ["timestamp", "time"].into_iter().find_map(|word| name.strip_prefix(word));
     let per_second = match STATED.iter().find(|(stated, _)| unit == Some(*stated)) {
@@ -175,6 +185,10 @@ mod tests {
             let (columns, rows) = records(&format!("{column}{rows}"));
             assert_eq!(rate_hz(&columns, &rows), Some(rate), "{column} {rate}");
         }
+        let times = (0..300).filter(|frame| ![7, 23, 24, 60].contains(frame));
+        let rows: String = times.map(|frame| format!("\n{:.2}", f64::from(frame) / 100.0)).collect();
+        let (columns, rows) = records(&format!("time{rows}"));
+        assert_eq!(rate_hz(&columns, &rows), Some(100.0), "without four frames");
     }
 
     #[test]

@@ -27,6 +27,7 @@ pub const POINTS: [&str; 12] = [
 ];
 /// Beyond all pictures, pixels.
 const FAR: f64 = 9999.0;
+const LOW: f64 = -999.0;
 /// Points of less confidence are missing.
 pub const LEAST_CONFIDENCE: f64 = 0.1;
 
@@ -52,9 +53,9 @@ impl Raw {
         self.sure.or(self.third.filter(|_| !has_depth && !layout.has_picture_depth()))
     }
 
-    /// Two equal numbers outside every picture, or 0, are a missing point.
+    /// 0, 0 and -1, -1 are a missing point, and so are two equal numbers outside every picture.
     pub fn in_picture(&self) -> Option<Point3> {
-        let missing = self.x == self.y && (self.x == 0.0 || self.x <= -1.0 || self.x >= FAR);
+        let missing = self.x == self.y && (self.x == 0.0 || self.x == -1.0 || self.x <= LOW || self.x >= FAR);
         // Not 0, 0, 0, which is a missing marker.
         (!missing && self.x.is_finite() && self.y.is_finite()).then_some([self.x, self.y, 1e-9])
     }
@@ -255,7 +256,7 @@ mod tests {
         for constant in [0.0, -1.0, -9999.99, 9_999_999.0, f64::NAN] {
             assert!(!seen(constant, constant), "{constant}");
         }
-        assert!(seen(120.0, 120.0) && seen(-1.0, 200.0) && seen(-0.4, -0.4));
+        assert!(seen(120.0, 120.0) && seen(-1.0, 200.0) && seen(-30.0, -30.0));
     }
 
     #[test]
