@@ -258,6 +258,8 @@ pub fn written(place: &Path, opening: &str) -> Result<u32> {
 
 #[cfg(test)]
 mod tests {
+    use super::count;
+
     #[test]
     fn packages_with_tests_on_the_emulated_rig_are_known_to_run_programs() {
         let packages = std::fs::read_dir(super::ROOT.join("host")).unwrap().flatten();
@@ -273,8 +275,6 @@ mod tests {
         }
         assert!(found > 0);
     }
-
-    use super::count;
 
     #[test]
     fn reads_the_test_runners_summary() {

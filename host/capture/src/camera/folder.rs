@@ -3,7 +3,6 @@
 use std::{
     collections::BTreeMap,
     fs,
-    hash::{DefaultHasher, Hasher},
     path::{Path, PathBuf},
     time::{Duration, Instant, SystemTime},
 };
@@ -19,7 +18,7 @@ use farnear_protocol::{
 
 use super::{
     Camera, CameraError, Frame, Image, Stamp,
-    pairing::{Belongs, Evidence, Pairing, by_number, content},
+    pairing::{self, Belongs, Evidence, Pairing, by_number, content},
     pixels::of_picture,
 };
 use crate::describe::trigger_name;
@@ -101,7 +100,7 @@ impl FolderCamera {
             match self.used.get_mut(&path) {
                 None => fresh.push((written, path)),
                 Some(used) if (used.written, used.bytes) == (written, bytes) => {}
-                Some(used) => match (used.paired, hash_of(&path)) {
+                Some(used) => match (used.paired, fs::read(&path).ok().map(|bytes| hash_of(&bytes))) {
                     // Another program holds it, or it was being written when the camera was armed.
                     (Some(_), None) => {}
                     (None, _) if !was_complete(used, written) => {}
@@ -143,7 +142,7 @@ impl FolderCamera {
                     Some((same, read, since)) if *same == path && *read == bytes => {
                         match complete(&bytes).and_then(|()| decode_grey(&bytes)) {
                             Ok(picture) => {
-                                let paired = Some(hash(&bytes));
+                                let paired = Some(hash_of(&bytes));
                                 let used = Used { written, bytes: bytes.len() as u64, paired };
                                 self.used.insert(path.clone(), used);
                                 let failed = |reason| CameraError::File { path: path.clone(), reason };
@@ -179,14 +178,8 @@ fn is_picture(path: &Path) -> bool {
     pictures::EXTENSIONS.contains(&ending.as_str())
 }
 
-fn hash(bytes: &[u8]) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    hasher.write(bytes);
-    hasher.finish()
-}
-
-fn hash_of(path: &Path) -> Option<u64> {
-    fs::read(path).ok().map(|bytes| hash(&bytes))
+fn hash_of(bytes: &[u8]) -> u64 {
+    pairing::hash(bytes.iter().map(|byte| u64::from(*byte)))
 }
 
 /// Whether the file had been complete before it was rewritten.

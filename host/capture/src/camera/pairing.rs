@@ -70,9 +70,13 @@ pub fn content(image: &Image) -> Option<u64> {
     if image.pixels.iter().all(|pixel| pixel == first) {
         return None;
     }
-    // FNV-1a.
-    let hash = |hash: u64, pixel: &u16| (hash ^ u64::from(*pixel)).wrapping_mul(0x0000_0100_0000_01b3);
-    Some(image.pixels.iter().fold(0xcbf2_9ce4_8422_2325, hash))
+    Some(hash(image.pixels.iter().map(|pixel| u64::from(*pixel))))
+}
+
+/// FNV-1a.
+pub(super) fn hash(values: impl Iterator<Item = u64>) -> u64 {
+    let add = |hash: u64, value: u64| (hash ^ value).wrapping_mul(0x0000_0100_0000_01b3);
+    values.fold(0xcbf2_9ce4_8422_2325, add)
 }
 
 /// Relation of a frame to an exposure.
@@ -97,8 +101,7 @@ pub struct Pairing {
     /// Longest interval of two exposures, or one and a half times the longest wait for a picture without a stamp, at most
     /// [`QUIET_MAX`]: a surplus one may be as late.
     longest: Duration,
-    /// Arrival of the last picture.
-    came: Option<Instant>,
+    last_arrival: Option<Instant>,
     delays: Delays,
     /// Of a later exposure, whose image it is.
     early: Option<Frame>,
@@ -121,7 +124,7 @@ impl Pairing {
             in_real_time: false,
             contents: Vec::new(),
             longest: Duration::ZERO,
-            came: None,
+            last_arrival: None,
             delays: Delays::default(),
             early: None,
         }
@@ -224,7 +227,7 @@ impl Pairing {
         let came = evidence.arrived.unwrap_or_else(Instant::now);
         let reported = self.delays.reported_at(wanted).filter(|_| evidence.stamp == Stamp::default());
         // Until the picture before it came, the camera was busy with that one.
-        let begun = reported.max(reported.and(self.came));
+        let begun = reported.max(reported.and(self.last_arrival));
         let waited = begun.map_or(Duration::ZERO, |begun| came.saturating_duration_since(begun));
         let earliest = self.at_least(shot.strobe_start.0).filter(|_| self.in_real_time);
         if let (Some(arrived), Some(earliest)) = (evidence.arrived, earliest)
@@ -249,7 +252,7 @@ impl Pairing {
         };
         let interval = Duration::from_micros(to.saturating_sub(from));
         self.longest = self.longest.max(interval).max((waited * 3 / 2).min(QUIET_MAX));
-        self.came = Some(came);
+        self.last_arrival = Some(came);
         self.last = Some((evidence, *shot));
         Ok(Belongs::Here)
     }

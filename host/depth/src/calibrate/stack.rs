@@ -28,7 +28,7 @@ use crate::psf::Psf;
 use crate::slice_order;
 use astigmatism::FocusByDirection;
 use blur::BlurCurve;
-use focus_plane::FocusPlane;
+use focus_plane::{FocusPlane, Slices};
 
 pub use held_out::{AtDepth, HeldOut};
 pub use response::{LENSES, Trial};
@@ -165,9 +165,10 @@ pub fn calibrate_stack(
     check(slices, settings)?;
     let not_stopped = || proceed(0);
     let evened = brightness::evened(slices);
-    let plane = FocusPlane::of(&evened, &not_stopped)?;
+    let of_focus = Slices::new(&evened);
+    let plane = of_focus.plane(&not_stopped)?;
     let blur = BlurCurve::of(&evened, &plane, &not_stopped)?;
-    let by_direction = FocusByDirection::of(&evened, &not_stopped)?;
+    let by_direction = FocusByDirection::of(&of_focus, &not_stopped)?;
     drop(evened);
     let (bin, pair_step) = separation(&blur, slices.len(), largest_bin(slices[0].dim()), settings)?;
     let limit = FLAT * pair_step as f64;

@@ -62,7 +62,7 @@ pub struct Coarser {
 #[serde(deny_unknown_fields)]
 pub struct Astigmatism {
     /// Normalised depth that the texture's anisotropy (see `direction.rs`) adds, per unit, in the middle of the field.
-    pub shift: [f64; 2],
+    pub shift_per_anisotropy: [f64; 2],
     /// Standard deviation of the shift: over the field, and by its measurement.
     pub spread: f64,
     /// Anisotropy of the target, as seen through the lens, at the measured depths of [`Stage::response`].
@@ -136,7 +136,9 @@ impl Stage {
 
     /// Normalised depth that astigmatism adds to texture of an anisotropy, relative to the target, and its standard deviation.
     pub fn shift(&self, measured: f64, anisotropy: [f64; 2]) -> [f64; 2] {
-        let Some(Astigmatism { shift, spread, of_target }) = &self.astigmatism else { return [0.0; 2] };
+        let Some(Astigmatism { shift_per_anisotropy, spread, of_target }) = &self.astigmatism else {
+            return [0.0; 2];
+        };
         let [cos, sin] = [0, 1].map(|i| {
             let usual = interpolated(self.measured, &of_target[i], measured);
             usual.map_or(f64::NAN, |[usual, _]| anisotropy[i] - usual)
@@ -145,7 +147,7 @@ impl Stage {
         if !away.is_finite() {
             return [0.0; 2];
         }
-        let by = shift[0] * cos + shift[1] * sin;
+        let by = shift_per_anisotropy[0] * cos + shift_per_anisotropy[1] * sin;
         [by, (DIRECTION_ERROR * by).hypot(spread * away)]
     }
 
@@ -164,8 +166,8 @@ impl Stage {
                 return Some("coarser must have finite values and a larger coarseness than of_target");
             }
         }
-        if let Some(Astigmatism { shift, spread, of_target }) = &self.astigmatism {
-            let all = shift.iter().chain(of_target.as_flattened()).chain([spread]);
+        if let Some(Astigmatism { shift_per_anisotropy, spread, of_target }) = &self.astigmatism {
+            let all = shift_per_anisotropy.iter().chain(of_target.as_flattened()).chain([spread]);
             if !all.clone().all(|v| v.is_finite() && v.abs() < 20.0) || *spread < 0.0 {
                 return Some("astigmatism must have values within -20 to 20 and a spread of 0 or more");
             }
@@ -232,7 +234,7 @@ mod tests {
             assert_eq!(deviation > 0.0, coarseness != 1.0 && coarseness != 2.0 && !coarseness.is_nan());
         }
         let of_target = [0.2, 0.0].map(|usual| [usual; RESPONSE_POINTS]);
-        let astigmatism = Astigmatism { shift: [0.5, 0.0], spread: 0.1, of_target };
+        let astigmatism = Astigmatism { shift_per_anisotropy: [0.5, 0.0], spread: 0.1, of_target };
         let astigmatic = Stage { astigmatism: Some(astigmatism), ..stage };
         assert_eq!(astigmatic.problem(), None);
         let [by, deviation] = astigmatic.shift(0.3, [1.2, 0.0]);

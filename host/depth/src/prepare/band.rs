@@ -124,7 +124,19 @@ pub(crate) fn product(a: &Array2<f32>, b: &Array2<f32>, y: usize, row: &mut [f32
     row.iter_mut().zip(a).zip(b).for_each(|((to, a), b)| *to = a * b);
 }
 
-/// Row `y` of an image blurred by a binomial of five taps along both axes; borders reflected. `across` has four columns more.
+/// The image blurred by a binomial of five taps along both axes; borders reflected.
+pub(crate) fn binomial(image: ArrayView2<f32>) -> Array2<f32> {
+    let (size, width) = (image.dim(), image.ncols());
+    let image = image.as_standard_layout();
+    let mut result = Array2::zeros(size);
+    result.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each_init(
+        || vec![0.0_f32; width + 4],
+        |across, (y, mut row)| binomial_row(&image, y, across, row.as_slice_mut().unwrap_or_default()),
+    );
+    result
+}
+
+/// Row `y` of [`binomial`]. `across` has four columns more.
 fn binomial_row(image: &CowArray<f32, Ix2>, y: usize, across: &mut [f32], to: &mut [f32]) {
     const WEIGHTS: [f32; 5] = [0.0625, 0.25, 0.375, 0.25, 0.0625];
     let ((height, width), backend) = (image.dim(), Backend::best());

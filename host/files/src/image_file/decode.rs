@@ -151,7 +151,7 @@ fn other(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     let numbered = if format == ImageFormat::Bmp { bmp::numbered(bytes) } else { None };
     let (bytes, palette): (Cow<'_, [u8]>, _) = match numbered {
         Some((numbered, palette)) => (Cow::Owned(numbered), Some(palette)),
-        None if format == ImageFormat::Png => (metadata::before_pixels(bytes), None),
+        None if format == ImageFormat::Png => (metadata::metadata_first(bytes), None),
         None => (Cow::Borrowed(bytes), None),
     };
     let bytes = &*bytes;

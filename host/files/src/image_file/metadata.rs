@@ -19,17 +19,17 @@ fn of_xmp(xmp: &[u8]) -> Option<u8> {
     (1..=8).contains(&value).then_some(value)
 }
 
-/// A PNG with its EXIF, XMP and texts before the pixels, where decoders look for them. ExifTool writes them behind.
-pub(super) fn before_pixels(png: &[u8]) -> Cow<'_, [u8]> {
+/// A PNG with its EXIF, XMP and texts before the pixels, where decoders look for them. ExifTool writes them after.
+pub(super) fn metadata_first(png: &[u8]) -> Cow<'_, [u8]> {
     let mut chunks = complete::png_chunks(png).take_while(|(name, _)| *name != b"IEND");
     let pixels = chunks.find(|(name, _)| *name == b"IDAT");
-    let behind = chunks.filter(|(name, _)| matches!(*name, b"eXIf" | b"iTXt" | b"tEXt" | b"zTXt"));
-    let behind: Vec<_> = behind.map(|(_, place)| place).collect();
-    let Some((_, pixels)) = pixels.filter(|_| !behind.is_empty()) else { return png.into() };
+    let after = chunks.filter(|(name, _)| matches!(*name, b"eXIf" | b"iTXt" | b"tEXt" | b"zTXt"));
+    let after: Vec<_> = after.map(|(_, place)| place).collect();
+    let Some((_, pixels)) = pixels.filter(|_| !after.is_empty()) else { return png.into() };
     let mut ordered = png[..pixels.start].to_vec();
-    behind.iter().for_each(|place| ordered.extend_from_slice(&png[place.clone()]));
+    after.iter().for_each(|place| ordered.extend_from_slice(&png[place.clone()]));
     let mut at = pixels.start;
-    for place in behind {
+    for place in after {
         ordered.extend_from_slice(&png[at..place.start]);
         at = place.end;
     }
@@ -79,7 +79,7 @@ pub fn exposure_time(bytes: &[u8]) -> Option<String> {
         complete::jpeg_exif(bytes)?.to_vec()
     } else {
         let format: ImageFormat = image::guess_format(bytes).ok()?;
-        let bytes = if format == ImageFormat::Png { before_pixels(bytes) } else { bytes.into() };
+        let bytes = if format == ImageFormat::Png { metadata_first(bytes) } else { bytes.into() };
         let mut decoder = ImageReader::with_format(Cursor::new(&*bytes), format).into_decoder().ok()?;
         of_decoder(&mut decoder, &bytes).0?
     };
@@ -137,7 +137,7 @@ pub(crate) mod tests {
         bytes
     }
 
-    /// With the metadata behind the pixels.
+    /// With the metadata after the pixels.
     fn appended(png: &[u8]) -> Vec<u8> {
         let chunks = complete::png_chunks(png);
         let (moved, others): (Vec<_>, Vec<_>) =

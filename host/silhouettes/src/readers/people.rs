@@ -73,8 +73,8 @@ struct Group<'a> {
 /// Median distance of a point from its median place, along the axis with most of it. A few wrong frames do not count.
 fn movement(frames: &[Vec<Option<Point3>>], place: usize) -> f64 {
     let median = |mut values: Vec<f64>| {
-        values.sort_by(f64::total_cmp);
-        values.get(values.len() / 2).copied().unwrap_or_default()
+        let middle = values.len() / 2;
+        if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
     };
     let seen = || frames.iter().filter_map(|frame| frame.get(place).copied().flatten());
     let along = |axis: usize| {

@@ -1,9 +1,7 @@
 //! Astigmatism of a lens: depth from focus of the target's detail along x less that along y, and of the two diagonals.
 
-use ndarray::Array2;
-
 use super::StackError;
-use super::focus_plane::FocusPlane;
+use super::focus_plane::{FocusPlane, Slices};
 
 /// Directions (down, right) that are compared: for the means of `cos 2t` and of `sin 2t`.
 const COMPARED: [[[isize; 2]; 2]; 2] = [[[0, 1], [1, 0]], [[1, 1], [-1, 1]]];
@@ -15,49 +13,48 @@ const SIGNIFICANT: f64 = 4.0;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FocusByDirection {
     /// In the middle of the field, slices.
-    pub shift: [f64; 2],
+    pub shift_per_anisotropy: [f64; 2],
     /// Its standard deviation, over the field and by its measurement, slices.
     pub spread: f64,
 }
 
 impl FocusByDirection {
     /// `None` without a significant difference, or where the target lacks a direction.
-    pub fn of(
-        slices: &[Array2<f32>],
-        proceed: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Option<Self>, StackError> {
-        let (height, width) = slices[0].dim();
+    pub fn of(slices: &Slices<'_>, proceed: &(dyn Fn() -> bool + Sync)) -> Result<Option<Self>, StackError> {
+        let (height, width) = slices.dim();
         let [height, width] = [height, width].map(|side| side as f64);
-        let plane = |apart| match FocusPlane::along(slices, apart, proceed) {
+        let plane = |apart| match slices.plane_along(apart, proceed) {
             Ok(plane) => Ok(Some(plane)),
             Err(StackError::NoFocus { .. }) => Ok(None),
             Err(error) => Err(error),
         };
-        let (mut found, mut variance, mut is_significant) = ([0.0; 2], 0.0, false);
-        for (found, [one, other]) in found.iter_mut().zip(COMPARED) {
+        let (mut shift_per_anisotropy, mut variance, mut is_significant) = ([0.0; 2], 0.0, false);
+        for (shift, [one, other]) in shift_per_anisotropy.iter_mut().zip(COMPARED) {
             let (Some(one), Some(other)) = (plane(one)?, plane(other)?) else { return Ok(None) };
             let middle = |plane: &FocusPlane| plane.at(0.5 * height, 0.5 * width);
             let of_mean = |plane: &FocusPlane| plane.spread.powi(2) / plane.blocks as f64;
             let squared_error = of_mean(&one) + of_mean(&other);
-            *found = middle(&one) - middle(&other);
-            is_significant |= found.powi(2) > SIGNIFICANT.powi(2) * squared_error;
+            *shift = middle(&one) - middle(&other);
+            is_significant |= shift.powi(2) > SIGNIFICANT.powi(2) * squared_error;
             // Evenly distributed over the field.
             let over_field = ((one.x_per_px - other.x_per_px) * width).powi(2)
                 + ((one.y_per_px - other.y_per_px) * height).powi(2);
             variance += squared_error + over_field / 12.0;
         }
-        Ok(is_significant.then(|| Self { shift: found, spread: variance.sqrt() }))
+        Ok(is_significant.then(|| Self { shift_per_anisotropy, spread: variance.sqrt() }))
     }
 
     /// In normalised depth, which changes by 2 over a pair of slices `pair_step` apart.
     pub fn of_pairs(self, pair_step: usize) -> Self {
         let per_slice = 2.0 / pair_step as f64;
-        Self { shift: self.shift.map(|slices| slices * per_slice), spread: self.spread * per_slice }
+        let shift_per_anisotropy = self.shift_per_anisotropy.map(|slices| slices * per_slice);
+        Self { shift_per_anisotropy, spread: self.spread * per_slice }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use ndarray::Array2;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -93,11 +90,17 @@ mod tests {
 
     #[test]
     fn detail_along_x_and_y_has_its_own_focus() {
-        let found = FocusByDirection::of(&slices(0.4), &|| true).unwrap().unwrap();
-        assert!((found.shift[0] + 0.35).abs() < 0.1 && found.shift[1].abs() < 0.1, "{found:?}");
-        let none = FocusByDirection::of(&slices(0.0), &|| true).unwrap();
-        assert!(none.is_none_or(|found| found.shift.iter().all(|shift| shift.abs() < 0.05)), "{none:?}");
-        let stopped = FocusByDirection::of(&slices(0.4), &|| false);
+        let found = FocusByDirection::of(&Slices::new(&slices(0.4)), &|| true).unwrap().unwrap();
+        assert!(
+            (found.shift_per_anisotropy[0] + 0.35).abs() < 0.1 && found.shift_per_anisotropy[1].abs() < 0.1,
+            "{found:?}"
+        );
+        let none = FocusByDirection::of(&Slices::new(&slices(0.0)), &|| true).unwrap();
+        assert!(
+            none.is_none_or(|found| found.shift_per_anisotropy.iter().all(|shift| shift.abs() < 0.05)),
+            "{none:?}"
+        );
+        let stopped = FocusByDirection::of(&Slices::new(&slices(0.4)), &|| false);
         assert!(matches!(stopped, Err(StackError::Stopped)));
     }
 }

@@ -135,8 +135,8 @@ pub(super) fn by_direction<'a>(
 ) -> Option<Astigmatism> {
     let table =
         |component: usize| table(samples.clone().map(move |s| [s.measured, s.anisotropy[component]]), curve);
-    let FocusByDirection { shift, spread } = focus;
-    Some(Astigmatism { shift, spread, of_target: [table(0)?, table(1)?] })
+    let FocusByDirection { shift_per_anisotropy, spread } = focus;
+    Some(Astigmatism { shift_per_anisotropy, spread, of_target: [table(0)?, table(1)?] })
 }
 
 /// Values of texture `[measured depth, value]` at the response's measured depths.

@@ -13,6 +13,7 @@ use crate::border::reflect;
 use crate::brightness::mean;
 use crate::median::deviation;
 use crate::optics::binned_place;
+use crate::prepare::band::binomial;
 
 /// Side of the smallest block in parts of the shorter side.
 const BLOCKS: usize = 24;
@@ -59,49 +60,67 @@ impl FocusPlane {
         let at_origin = self.at(first, first);
         Self { x_per_px: self.x_per_px * b, y_per_px: self.y_per_px * b, at_origin, ..*self }
     }
+}
 
-    /// Finds the plane. Fails if too few blocks have a peak inside the stack, and when `proceed` returns false.
-    pub fn of(slices: &[Array2<f32>], proceed: &(dyn Fn() -> bool + Sync)) -> Result<Self, StackError> {
-        Self::of_detail(slices, slices.to_vec(), &BLURS, proceed)
-    }
+/// The slices of a stack with the brightness of their blocks.
+pub(super) struct Slices<'a> {
+    slices: &'a [Array2<f32>],
+    side: usize,
+    brightness: Vec<Array2<f64>>,
+}
 
-    /// As [`of`](Self::of), of the differences of pixels `apart` (down, right): mostly of texture that changes in this
-    /// direction.
-    pub(super) fn along(
-        slices: &[Array2<f32>],
-        apart: [isize; 2],
-        proceed: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Self, StackError> {
-        let differences = slices.par_iter().map(|slice| difference(slice, apart)).collect();
-        Self::of_detail(slices, differences, &BLURS[..2], proceed)
-    }
-
-    /// Of the `detail` of slices, after the numbers of blurs in `scales`.
-    fn of_detail(
-        slices: &[Array2<f32>],
-        detail: Vec<Array2<f32>>,
-        scales: &[usize],
-        proceed: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Self, StackError> {
+impl<'a> Slices<'a> {
+    pub fn new(slices: &'a [Array2<f32>]) -> Self {
         let (height, width) = slices[0].dim();
         let side = (height.min(width) / BLOCKS).clamp(12, 64);
-        let brightness = brightness(slices, side);
-        let mut smooth = detail;
-        let mut best: Option<(f64, Self)> = None;
+        Self { slices, side, brightness: brightness(slices, side) }
+    }
+
+    pub fn dim(&self) -> (usize, usize) {
+        self.slices[0].dim()
+    }
+
+    /// The plane of focus. Fails if too few blocks have a peak inside the stack, and when `proceed` returns false.
+    pub fn plane(&self, proceed: &(dyn Fn() -> bool + Sync)) -> Result<FocusPlane, StackError> {
+        self.plane_of(Array2::clone, &BLURS, proceed)
+    }
+
+    /// As [`plane`](Self::plane), of the differences of pixels `apart` (down, right): mostly of texture that changes in this
+    /// direction.
+    pub fn plane_along(
+        &self,
+        apart: [isize; 2],
+        proceed: &(dyn Fn() -> bool + Sync),
+    ) -> Result<FocusPlane, StackError> {
+        self.plane_of(|slice| difference(slice, apart), &BLURS[..2], proceed)
+    }
+
+    /// Of the `detail` of slices, after each number of blurs in `scales`.
+    fn plane_of(
+        &self,
+        detail: impl Fn(&Array2<f32>) -> Array2<f32> + Sync,
+        scales: &[usize],
+        proceed: &(dyn Fn() -> bool + Sync),
+    ) -> Result<FocusPlane, StackError> {
+        let of_slice = |(slice, brightness): (&Array2<f32>, &Array2<f64>)| {
+            let (mut smooth, mut passes) = (detail(slice), 0);
+            let mut of_scale = |blurs: &usize| {
+                while passes < *blurs {
+                    smooth = proceed().then(|| binomial(smooth.view()))?;
+                    passes += 1;
+                }
+                Some(laplacian_energy(&smooth, self.side) / (brightness * brightness))
+            };
+            scales.iter().map(&mut of_scale).collect::<Option<Vec<Array2<f64>>>>()
+        };
+        let energies = self.slices.par_iter().zip(&self.brightness).map(of_slice);
+        let energies: Vec<Vec<Array2<f64>>> = energies.collect::<Option<_>>().ok_or(StackError::Stopped)?;
+        let mut best: Option<(f64, FocusPlane)> = None;
         let (mut most, mut of_most) = (0, 0);
-        let mut passes = 0;
-        for &blurs in scales {
-            while passes < blurs {
-                let slices = smooth.par_iter().map(|slice| proceed().then(|| blurred(slice)));
-                smooth = slices.collect::<Option<_>>().ok_or(StackError::Stopped)?;
-                passes += 1;
-            }
-            let energies = smooth.par_iter().zip(&brightness).map(|(slice, brightness)| {
-                proceed().then(|| laplacian_energy(slice, side) / (brightness * brightness))
-            });
-            let energies: Vec<Array2<f64>> = energies.collect::<Option<_>>().ok_or(StackError::Stopped)?;
+        for scale in 0..scales.len() {
+            let energies: Vec<&Array2<f64>> = energies.iter().map(|of_slice| &of_slice[scale]).collect();
             for merged in MERGED {
-                let points = peaks(&energies, merged, side);
+                let points = peaks(&energies, merged, self.side);
                 let all = (energies[0].nrows() / merged) * (energies[0].ncols() / merged);
                 if points.len() > most {
                     (most, of_most) = (points.len(), all);
@@ -121,7 +140,7 @@ impl FocusPlane {
 }
 
 /// Column, row and slice of the blocks with a peak; a block is `merged` x `merged` of the energies' blocks.
-fn peaks(energies: &[Array2<f64>], merged: usize, side: usize) -> Vec<[f64; 3]> {
+fn peaks(energies: &[&Array2<f64>], merged: usize, side: usize) -> Vec<[f64; 3]> {
     let (rows, columns) = energies[0].dim();
     let mut points = Vec::new();
     for y in 0..rows / merged {
@@ -197,21 +216,6 @@ pub(super) fn middle(image: &Array2<f32>) -> Array2<f32> {
     let side = height.min(width);
     let (top, left) = ((height - side) / 2, (width - side) / 2);
     image.slice(s![top..top + side, left..left + side]).to_owned()
-}
-
-/// Binomial blur of five taps along both axes.
-pub(super) fn blurred(image: &Array2<f32>) -> Array2<f32> {
-    let (height, width) = image.dim();
-    let pass = |image: &Array2<f32>, down: isize, right: isize| {
-        Array2::from_shape_fn((height, width), |(y, x)| {
-            let at = |i: isize| {
-                let [y, x] = [reflect(y as isize + i * down, height), reflect(x as isize + i * right, width)];
-                image[(y, x)]
-            };
-            (at(-2) + 4.0 * at(-1) + 6.0 * at(0) + 4.0 * at(1) + at(2)) / 16.0
-        })
-    };
-    pass(&pass(image, 1, 0), 0, 1)
 }
 
 /// Each pixel's difference to the one `apart` (down, right) from it.

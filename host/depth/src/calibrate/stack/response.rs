@@ -11,7 +11,7 @@ use ndarray::Array2;
 use super::StackError;
 use super::astigmatism::FocusByDirection;
 use super::curve::Curve;
-use super::focus_plane::{FocusPlane, blurred};
+use super::focus_plane::FocusPlane;
 use super::foreign;
 use super::held_out::{HeldOut, Judged, Split, finish, judge, robust};
 use crate::adaptive_window::{Bank, LEARNED_PX, Window};
@@ -21,7 +21,7 @@ use crate::measure::{DepthMethod, MeasureSettings, measure};
 use crate::median::median;
 use crate::optics::{Optics, Stage};
 use crate::pipeline::Settings;
-use crate::prepare::{PrepareSettings, Prepared, prepare};
+use crate::prepare::{PrepareSettings, Prepared, band::binomial, prepare};
 use crate::psf::Psf;
 
 /// Side of a checkerboard block, px: larger than the windows' reach.
@@ -336,7 +336,8 @@ impl Target<'_> {
                 let pair = [far, far + self.pair_step].map(|i| self.slices[i].clone());
                 let prepared = prepare(pair, &optics, None, &settings).ok()?;
                 // Equals a target with coarser texture, because blur and smoothing commute.
-                let [far_image, near_image] = [&prepared.far, &prepared.near].map(blurred);
+                let [far_image, near_image] =
+                    [&prepared.far, &prepared.near].map(|image| binomial(image.view()));
                 let noise = prepared.noise.scaled(SMOOTHED_NOISE);
                 let coarse = Prepared { far: far_image, near: near_image, noise, ..prepared.clone() };
                 let pair = |prepared, original| Pair {
